@@ -113,7 +113,7 @@ struct Block {
   test::Context context;
   dfm_world world = 0;
   dfm_body body = 0;
-  Block(double theta, const char *law, std::vector<dfm_param_value> params) {
+  Block(double theta, const char *law, const test::LawValues &params) {
     test::ok(dfm_plugin_register_static(context, entry, "test laws"));
     world = test::make_world(context, {kG * std::sin(theta), 0, -kG * std::cos(theta)});
     test::BodyOptions o;
@@ -123,12 +123,7 @@ struct Block {
     o.position = {-0.05, -0.05, 2e-5};
     body = test::make_body(context, world, "beam", {0.1, 0.1, 0.1}, 60, o);
     test::add_plane(world, "floor");
-    dfm_friction_def f{};
-    f.size = sizeof f;
-    f.between[0] = f.between[1] = "*";
-    f.law = law;
-    f.params = {sizeof(dfm_params), static_cast<uint32_t>(params.size()), params.data()};
-    test::ok(dfm_world_add_friction(world, &f));
+    test::ok(test::add_friction(world, law, params));
   }
   void push(double vx, double vy) const {
     uint32_t n = 0;
@@ -142,17 +137,14 @@ struct Block {
   }
 };
 
-const double zero = 0;
-
 }  // namespace
 
 TEST(Viscous, BlockOnLayer_LosesSpeedExponentially) {
   for (const double c : {1e2, 4e2})
     for (const std::string law : {"org.test.viscous", "org.test.viscous_bare", "coulomb"}) {
       Block b(0, law.c_str(),
-              law == "coulomb"
-                  ? std::vector<dfm_param_value>{{"mu_C", &zero, 1}, {"mu_S", &zero, 1}, {"sigma2", &c, 1}}
-                  : std::vector<dfm_param_value>{{"c", &c, 1}});
+              law == "coulomb" ? test::LawValues{{"mu_C", 0}, {"mu_S", 0}, {"sigma2", c}}
+                               : test::LawValues{{"c", c}});
       test::run(b.world, 0.2, 1e-3);
       b.push(0.5, 0.25);
       const double rate = c * 0.01 / test::measure(b.body).mass;  // 1/s
@@ -170,7 +162,7 @@ TEST(Viscous, BlockOnLayer_LosesSpeedExponentially) {
 TEST(Viscous, StiffLayer_HoldsTheBlock) {
   for (const double c : {1e5, 1e7, 1e10})
     for (const char *law : {"org.test.viscous", "org.test.viscous_bare"}) {
-      Block b(0.2, law, {{"c", &c, 1}});
+      Block b(0.2, law, {{"c", c}});
       test::run(b.world, 0.5, 1e-3);
       const double speed = test::measure(b.body).velocity[0];
       const double terminal = test::measure(b.body).mass * kG * std::sin(0.2) / (c * 0.01);
@@ -186,7 +178,7 @@ TEST(Viscous, StiffLayer_HoldsTheBlock) {
 
 TEST(Viscous, SmoothedFriction_CreepsAtTheSpeedOfItsSlope) {
   const double theta = 0.5, mu = 0.8, t = std::tan(theta) / mu;
-  Block b(theta, "org.test.smoothed", {{"c", &mu, 1}});
+  Block b(theta, "org.test.smoothed", {{"c", mu}});
   test::run(b.world, 1, 1e-3);
   const double exact = kSmooth * t / std::sqrt(1 - t * t);
   EXPECT_NEAR(test::measure(b.body).velocity[0], exact, 1e-4 * exact);

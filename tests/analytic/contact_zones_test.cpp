@@ -12,10 +12,8 @@ constexpr double kG = 9.81;
 
 // Adds a speed along x to all points.
 void push(dfm_body body, double speed) {
-  uint32_t n = 0;
-  test::ok(dfm_body_get_state(body, 0, nullptr, nullptr, &n));
-  std::vector<double> x(3 * n), v(3 * n);
-  test::ok(dfm_body_get_state(body, n, x.data(), v.data(), &n));
+  auto [x, v] = test::State(body);
+  const uint32_t n = uint32_t(x.size() / 3);
   for (uint32_t i = 0; i < n; ++i) v[3 * i] += speed;
   test::ok(dfm_body_set_state(body, n, x.data(), v.data()));
 }
@@ -155,14 +153,8 @@ struct Crossing {
     block = test::make_zoned_beam(context, world, {0.03, 0.01, 0.01}, 36, o);
     const double mu = 0.1;
     for (int k = 0; k < 2; ++k) {
-      const dfm_param_value values[] = {{"mu", &mu, 1}, {"sigma0", &kSigma[one_law ? 0 : k], 1}};
-      dfm_friction_def f{};
-      f.size = sizeof f;
-      f.between[0] = "block";
-      f.between[1] = k ? "plate:far" : "plate:near";
-      f.law = "test.bristle";
-      f.params = {sizeof(dfm_params), 2, values};
-      test::ok(dfm_world_add_friction(world, &f));
+      test::ok(test::add_friction(world, "test.bristle", {{"mu", mu}, {"sigma0", kSigma[one_law ? 0 : k]}},
+                                  "block", k ? "plate:far" : "plate:near"));
     }
   }
   // Contacts of the block's own surfels on the plate, by surfel.

@@ -248,10 +248,8 @@ TEST(Coupled, HeldPoints_HoldTheSurfaceOverThem) {
   o.young = 1e6;
   o.damping_stiffness = 1e-3;
   const dfm_body b = test::make_body(context, w, "beam", {0.4, 0.05, 0.05}, 200, o);
-  uint32_t n = 0;
-  test::ok(dfm_body_get_state(b, 0, nullptr, nullptr, &n));
-  std::vector<double> p(size_t{3} * n);
-  test::ok(dfm_body_get_state(b, n, p.data(), nullptr, &n));
+  const std::vector<double> p = test::State(b).x;
+  const uint32_t n = uint32_t(p.size() / 3);
   std::vector<uint32_t> held;
   for (uint32_t i = 0; i < n; ++i)
     if (p[3 * i] < 1e-9) held.push_back(i);

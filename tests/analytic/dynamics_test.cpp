@@ -43,12 +43,7 @@ struct Bar {
   }
   ~Bar() { dfm_world_destroy(world); }
 
-  std::vector<double> positions() const {
-    std::vector<double> x(3 * size_t(npoint));
-    uint32_t n = 0;
-    test::ok(dfm_body_get_state(body, npoint, x.data(), nullptr, &n));
-    return x;
-  }
+  std::vector<double> positions() const { return test::State(body).x; }
   // Largest distance from the places of a field over the largest displacement in it; u: displacements.
   double error_of(const std::string &field, bool u) const {
     const std::vector<double> x = positions();

@@ -42,13 +42,7 @@ Loop measured(uint32_t cells) {
   dfm_obstacle plane = 0;
   ok(dfm_obstacle_create(world, &floor, &plane));
   const double mu = kMu, sigma0 = kStiffness / (kEdge * kEdge);
-  const dfm_param_value values[] = {{"mu_C", &mu, 1}, {"sigma0", &sigma0, 1}};
-  dfm_friction_def f{};
-  f.size = sizeof f;
-  f.between[0] = f.between[1] = "*";
-  f.law = "dahl";
-  f.params = {sizeof(dfm_params), 2, values};
-  ok(dfm_world_add_friction(world, &f));
+  ok(add_friction(world, "dahl", {{"mu_C", mu}, {"sigma0", sigma0}}));
 
   dfm_body_info info{};
   info.size = sizeof info;

@@ -8,20 +8,13 @@
 
 namespace {
 
-struct State { std::vector<double> x, v; };
-State state(dfm_body b) {
-  uint32_t n = 0;
-  test::ok(dfm_body_get_state(b, 0, nullptr, nullptr, &n));
-  State s{std::vector<double>(3 * n), std::vector<double>(3 * n)};
-  test::ok(dfm_body_get_state(b, n, s.x.data(), s.v.data(), &n));
-  return s;
-}
+using test::State;
 
 // How far the upper leg's tip is above the lower one's, less what their halves take of it: 0 where they lie
 // on each other.
 double tip_gap(dfm_body b) {
   const test::Hook hook(0.01);
-  const State s = state(b);
+  const State s = State(b);
   double sum[4] = {}, n[4] = {};
   for (size_t i = 0; i < s.x.size(); i += 3) {
     const size_t level = size_t(std::lround(hook.points[i + 2] / 0.01));
@@ -129,7 +122,7 @@ TEST(SelfContact, PiecesThatPassEachOther_DoNotTouch) {
   test::ok(dfm_body_set_state(b, d.npoint, points.data(), v.data()));
   test::run(w, 0.3, 1e-3);
   EXPECT_EQ(test::stats(w).contacts_max, 0u);
-  const State after = state(b);
+  const State after = State(b);
   for (size_t i = 2; i < v.size(); i += 3) EXPECT_NEAR(after.v[i], v[i], 1e-9);
 }
 
@@ -225,7 +218,7 @@ TEST(SelfContact, RestShape_HasNoContactInAnyRigidMotion) {
       test::run(w, 0.01, 5e-4);
       EXPECT_EQ(test::stats(w).contacts_max, 0u) << s.kind << " " << s.cells;
     }
-    const State off = state(bodies[0]), on = state(bodies[1]);
+    const State off = State(bodies[0]), on = State(bodies[1]);
     EXPECT_EQ(off.x, on.x) << s.kind << ": what does not touch itself moves as if it could not";
     EXPECT_EQ(off.v, on.v) << s.kind;
   }
@@ -284,16 +277,7 @@ TEST(SelfContact, FrictionOfABodyWithItself_FollowsThePairRules) {
     o.pinch = 0.03;
     o.close = 0.5;
     test::make_hook(w, o);
-    if (rough) {
-      const double mu = 0.7;
-      const dfm_param_value v{"mu", &mu, 1};
-      dfm_friction_def f{};
-      f.size = sizeof f;
-      f.between[0] = f.between[1] = "hook";
-      f.law = "coulomb";
-      f.params = {sizeof(dfm_params), 1, &v};
-      test::ok(dfm_world_add_friction(w, &f));
-    }
+    if (rough) test::ok(test::add_friction(w, "coulomb", {{"mu", 0.7}}, "hook", "hook"));
     test::run(w, 0.05, 5e-4);
     double friction = 0;
     for (const dfm_contact &k : contacts(w)) friction += std::hypot(k.ft[0], k.ft[1]);

@@ -40,13 +40,7 @@ dfm_status find(dfm_world w, double time = 0, uint32_t load_steps = 1, dfm_equil
   return dfm_world_equilibrium(w, &def, info);
 }
 
-std::vector<double> positions(dfm_body b) {
-  uint32_t n = 0;
-  test::ok(dfm_body_get_state(b, 0, nullptr, nullptr, &n));
-  std::vector<double> x(3 * size_t(n));
-  test::ok(dfm_body_get_state(b, n, x.data(), nullptr, &n));
-  return x;
-}
+std::vector<double> positions(dfm_body b) { return test::State(b).x; }
 
 // Points that lie at z, within 1e-9 m.
 std::vector<uint32_t> layer(dfm_body b, double z) {

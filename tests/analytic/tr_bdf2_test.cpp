@@ -10,15 +10,7 @@ namespace {
 constexpr double kFrame = 1.0 / 60;
 constexpr int32_t kScheme = DFM_INTEGRATOR_TR_BDF2;
 
-struct State { std::vector<double> x, v; };
-
-State state_of(dfm_body b) {
-  uint32_t n = 0;
-  test::ok(dfm_body_get_state(b, 0, nullptr, nullptr, &n));
-  State s{std::vector<double>(3 * size_t{n}), std::vector<double>(3 * size_t{n})};
-  test::ok(dfm_body_get_state(b, n, s.x.data(), s.v.data(), &n));
-  return s;
-}
+using test::State;
 
 // Of y' = i hw y over a step of one: the trapezoidal rule to 2 - sqrt 2, then the second backward difference.
 double amplification(double hw) {
@@ -35,7 +27,7 @@ State fallen(const char *model, bool shaken, int32_t integrator, double seconds,
   o.model = model;
   o.damping_stiffness = 1e-3;
   const dfm_body b = test::make_body(context, w, "beam", {0.4, 0.1, 0.1}, 60, o);
-  const State start = state_of(b);
+  const State start = State(b);
   std::vector<uint32_t> held, loaded;
   for (uint32_t i = 0; i < start.x.size() / 3; ++i) {
     if (start.x[3 * size_t{i}] < 1e-9) held.push_back(i);
@@ -52,7 +44,7 @@ State fallen(const char *model, bool shaken, int32_t integrator, double seconds,
     test::ok(dfm_world_set_gravity_keys(w, 2, keys));
   }
   test::run(w, seconds, h);
-  State end = state_of(b);
+  State end = State(b);
   for (const uint32_t i : held)  // have the mean velocity of the last sub-step
     for (size_t k = 0; k < 3; ++k) end.v[3 * size_t{i} + k] = 0;
   return end;
@@ -82,13 +74,13 @@ TEST(TrBdf2, Oscillator_KeepsTheAmplitudeOfItsStabilityFunction) {
     test::ok(dfm_body_create(w, &tet.def, &b));
     const double stiff = o.young * (1 - o.poisson) / ((1 + o.poisson) * (1 - 2 * o.poisson));
     const double frequency = 2 / 0.1 * std::sqrt(stiff / o.density);
-    State s = state_of(b);
+    State s = State(b);
     s.x[3] += 1e-3;
     test::ok(dfm_body_set_state(b, 4, s.x.data(), s.v.data()));
     double last = 1e-3;
     for (int step = 0; step < 3; ++step) {
       test::run(w, hw / frequency, hw / frequency);
-      s = state_of(b);
+      s = State(b);
       const double amplitude = std::hypot(s.x[3] - 0.1, s.v[3] / frequency);
       EXPECT_NEAR(amplitude / last, amplification(hw), 1e-6) << "h w " << hw << ", step " << step;
       EXPECT_LT(amplitude, last) << "h w " << hw;
@@ -232,7 +224,7 @@ TEST(TrBdf2, BarLeftToAuto_StillSwingsAfterFivePeriods) {
     o.model = model;
     o.young = 2e7;
     const dfm_body bar = test::make_body(context, w, "beam", {0.4, 0.02, 0.02}, 200, o);
-    const State start = state_of(bar);
+    const State start = State(bar);
     std::vector<uint32_t> held;
     uint32_t tip = 0;
     for (uint32_t i = 0; i < start.x.size() / 3; ++i) {
@@ -243,7 +235,7 @@ TEST(TrBdf2, BarLeftToAuto_StillSwingsAfterFivePeriods) {
     std::vector<double> z;  // of the tip, after each step
     for (int step = 0; step < 120; ++step) {
       test::run(w, kFrame, kFrame);
-      z.push_back(state_of(bar).x[3 * size_t{tip} + 2]);
+      z.push_back(State(bar).x[3 * size_t{tip} + 2]);
     }
     dfm_world_stats stats = {};
     stats.size = sizeof stats;

@@ -53,10 +53,7 @@ std::vector<double> moved(const std::string &path) {
   test::ok(dfm_scene_world(s, &world));
   test::ok(dfm_world_find_body(world, "bar", &body));
   for (int i = 0; i < 50; ++i) test::ok(dfm_world_step(world, 1e-3, nullptr));
-  uint32_t n = 0;
-  test::ok(dfm_body_get_state(body, 0, nullptr, nullptr, &n));
-  std::vector<double> x(3 * size_t{n});
-  test::ok(dfm_body_get_state(body, n, x.data(), nullptr, &n));
+  const std::vector<double> x = test::State(body).x;
   return x;
 }
 

@@ -31,14 +31,6 @@ std::string file(const std::string &name, const std::string &text) {
 }
 std::string good() { return file("good.csv", header() + kFalls + "\n" + kCrosses + kMisses); }
 
-void expect_refused(const std::vector<std::string> &args, const std::vector<std::string> &words) {
-  const test::CommandResult r = test::deform(args);
-  EXPECT_EQ(r.exit_code, 2) << r.out;
-  EXPECT_EQ(std::count(r.err.begin(), r.err.end(), '\n'), 1) << r.err;
-  for (const std::string &word : words)
-    EXPECT_NE(r.err.find(word), std::string::npos) << "no '" << word << "' in: " << r.err;
-}
-
 }  // namespace
 
 TEST(CcdCommand, EveryRoot_WritesOneRowPerQuery) {
@@ -95,18 +87,21 @@ TEST(CcdCommand, BadFiles_AreRefusedWithTheirLine) {
   word.replace(word.find("0x1p-1"), 6, "half");
   nan.replace(nan.find("0x1p-1"), 6, "nan");
   kind.replace(kind.find("vf"), 2, "fv");
-  expect_refused({"ccd", folder() + "/none.csv"}, {"none.csv"});
-  expect_refused({"ccd", file("empty.csv", "")}, {"empty.csv", "empty"});
-  expect_refused({"ccd", file("column.csv", no_column + kFalls)}, {"column.csv:1:", "p2_t1_z", "p2_t1_Z"});
-  expect_refused({"ccd", file("word.csv", header() + kCrosses + word)}, {"word.csv:3:", "p0_t0_z", "half"});
-  expect_refused({"ccd", file("nan.csv", header() + nan)}, {"nan.csv:2:", "p0_t0_z", "finite"});
-  expect_refused({"ccd", file("kind.csv", header() + kind)}, {"kind.csv:2:", "fv", "vf"});
-  expect_refused({"ccd", file("short.csv", header() + "1,vf,0,0\n")}, {"short.csv:2:", "4 cells", "26"});
-  expect_refused({"ccd", good(), "--root", "brant"}, {"--root", "brant", "did you mean \"brent\""});
-  expect_refused({"ccd", good(), "--separation", "-1"}, {"min_separation"});
-  expect_refused({"ccd", good(), "--csv", folder() + "/no/such/folder.csv"}, {"no/such/folder.csv"});
-  expect_refused({"ccd", good(), "--csv", good()}, {"would be overwritten"});
-  expect_refused({"ccd"}, {"QUERIES"});
+  test::expect_refused({"ccd", folder() + "/none.csv"}, {"none.csv"});
+  test::expect_refused({"ccd", file("empty.csv", "")}, {"empty.csv", "empty"});
+  test::expect_refused({"ccd", file("column.csv", no_column + kFalls)},
+                       {"column.csv:1:", "p2_t1_z", "p2_t1_Z"});
+  test::expect_refused({"ccd", file("word.csv", header() + kCrosses + word)},
+                       {"word.csv:3:", "p0_t0_z", "half"});
+  test::expect_refused({"ccd", file("nan.csv", header() + nan)}, {"nan.csv:2:", "p0_t0_z", "finite"});
+  test::expect_refused({"ccd", file("kind.csv", header() + kind)}, {"kind.csv:2:", "fv", "vf"});
+  test::expect_refused({"ccd", file("short.csv", header() + "1,vf,0,0\n")},
+                       {"short.csv:2:", "4 cells", "26"});
+  test::expect_refused({"ccd", good(), "--root", "brant"}, {"--root", "brant", "did you mean \"brent\""});
+  test::expect_refused({"ccd", good(), "--separation", "-1"}, {"min_separation"});
+  test::expect_refused({"ccd", good(), "--csv", folder() + "/no/such/folder.csv"}, {"no/such/folder.csv"});
+  test::expect_refused({"ccd", good(), "--csv", good()}, {"would be overwritten"});
+  test::expect_refused({"ccd"}, {"QUERIES"});
 }
 
 TEST(CcdCommand, ReferenceQueries_NoneMissedNoneLate) {

@@ -44,12 +44,7 @@ test::CommandResult run(std::vector<std::string> arguments) {
 }
 
 void expect_refused(const std::vector<std::string> &arguments, const std::vector<std::string> &parts) {
-  const test::CommandResult r = run(arguments);
-  EXPECT_EQ(r.exit_code, 2) << arguments[0] << ": " << r.err;
-  EXPECT_EQ(std::count(r.err.begin(), r.err.end(), '\n'), 1) << r.err;
-  for (const std::string &part : parts)
-    EXPECT_NE(r.err.find(part), std::string::npos) << arguments[0] << ": expected " << part << " in\n"
-                                                   << r.err;
+  test::expect_refused(run(arguments), parts, arguments[0]);
 }
 
 struct Door {

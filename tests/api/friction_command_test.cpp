@@ -37,17 +37,10 @@ std::string push(const std::string &from = "", const std::string &to = "") {
   return text;
 }
 
-void expect_refused(const std::vector<std::string> &args, const std::vector<std::string> &words) {
-  const test::CommandResult r = test::deform(args);
-  EXPECT_EQ(r.exit_code, 2) << r.out;
-  EXPECT_EQ(r.out, "");
-  EXPECT_EQ(std::count(r.err.begin(), r.err.end(), '\n'), 1) << r.err;
-  for (const std::string &word : words)
-    EXPECT_NE(r.err.find(word), std::string::npos) << "no '" << word << "' in: " << r.err;
-}
 void expect_bad_case(const std::string &from, const std::string &to, std::vector<std::string> words) {
   words.push_back("bad.json");
-  expect_refused({"friction", file("bad.json", push(from, to)), "--csv", folder() + "/never.csv"}, words);
+  test::expect_refused({"friction", file("bad.json", push(from, to)), "--csv", folder() + "/never.csv"},
+                       words);
   EXPECT_FALSE(std::filesystem::exists(folder() + "/never.csv"));
 }
 
@@ -119,12 +112,13 @@ TEST(FrictionCommand, NamesOfTheSet_MeanOurLaws) {
 }
 
 TEST(FrictionCommand, BadCases_AreRefusedWithTheirPlace) {
-  expect_refused({"friction", folder() + "/none.json"}, {"none.json", "No such file"});
-  expect_refused({"friction", file("cut.json", push().substr(0, 90))}, {"cut.json:3:", "not JSON"});
-  expect_refused({"friction", file("list.json", "[1]")}, {"list.json", "object"});
+  test::expect_refused({"friction", folder() + "/none.json"}, {"none.json", "No such file"});
+  test::expect_refused({"friction", file("cut.json", push().substr(0, 90))}, {"cut.json:3:", "not JSON"});
+  test::expect_refused({"friction", file("list.json", "[1]")}, {"list.json", "object"});
   std::string spring = test::read_file(example("stick_slip"));
-  expect_refused({"friction", file("spring.json", spring.replace(spring.find("\"k\": "), 5, "\"k\": -"))},
-                 {"/input/k", "negative"});
+  test::expect_refused(
+      {"friction", file("spring.json", spring.replace(spring.find("\"k\": "), 5, "\"k\": -"))},
+      {"/input/k", "negative"});
   expect_bad_case("\"input\"", "\"inputs\"", {"/input"});
   expect_bad_case("\"bias_sine_force\"", "\"bias_sin_force\"",
                   {"/input/kind", "bias_sin_force", "did you mean \"bias_sine_force\""});
@@ -146,14 +140,14 @@ TEST(FrictionCommand, BadCases_AreRefusedWithTheirPlace) {
 
 TEST(FrictionCommand, BadUsage_IsRefused) {
   const std::string good = file("good.json", push());
-  expect_refused({"friction"}, {"CASE"});
-  expect_refused({"friction", good, "--step", "0"}, {"--step"});
-  expect_refused({"friction", good, "--step", "nan"}, {"--step"});
-  expect_refused({"friction", good, "--step", "1e-12"}, {"--step", "steps"});
-  expect_refused({"friction", good, "--steps", "1"}, {"--steps", "did you mean \"--step\""});
-  expect_refused({"friction", good, "--law", "culomb"}, {"culomb", "coulomb"});
-  expect_refused({"friction", good, "--law", folder() + "/no.so"}, {"no.so"});
-  expect_refused({"friction", good, "--csv", folder() + "/no/such/folder.csv"}, {"no/such/folder.csv"});
+  test::expect_refused({"friction"}, {"CASE"});
+  test::expect_refused({"friction", good, "--step", "0"}, {"--step"});
+  test::expect_refused({"friction", good, "--step", "nan"}, {"--step"});
+  test::expect_refused({"friction", good, "--step", "1e-12"}, {"--step", "steps"});
+  test::expect_refused({"friction", good, "--steps", "1"}, {"--steps", "did you mean \"--step\""});
+  test::expect_refused({"friction", good, "--law", "culomb"}, {"culomb", "coulomb"});
+  test::expect_refused({"friction", good, "--law", folder() + "/no.so"}, {"no.so"});
+  test::expect_refused({"friction", good, "--csv", folder() + "/no/such/folder.csv"}, {"no/such/folder.csv"});
   EXPECT_FALSE(std::filesystem::exists(folder() + "/no"));
 }
 
@@ -161,9 +155,9 @@ TEST(FrictionCommand, LoadWithoutProjection_IsRefused) {
   std::string text = test::read_file(example("load_wave"));
   const std::string other =
       std::string(text).replace(text.find("\"F0\""), 4, "\"form\": \"Fn = F0(1+a sin)\", \"F0\"");
-  expect_refused({"friction", file("form.json", other)}, {"/input", "projection"});
+  test::expect_refused({"friction", file("form.json", other)}, {"/input", "projection"});
   text.replace(text.find("\"F_elastic\""), 11, "\"cone_excess\"");
-  expect_refused({"friction", file("excess.json", text)}, {"/input", "projection"});
+  test::expect_refused({"friction", file("excess.json", text)}, {"/input", "projection"});
 }
 
 TEST(FrictionCommand, ThirdPartyLaw_RunsByPathAndItsMissingKeysAreNamed) {
@@ -223,8 +217,8 @@ TEST(FrictionCommand, NormalForceOfAMeasurement_ScalesTheLoop) {
            "normal force is /normal_force");
   reported("\"law\"", "\"normal_load\": 3, \"law\"", "/normal_load is not read; the normal force is");
   reported("\"freq\": 1", "\"freq\": 1, \"phas\": 1", "did you mean \"phase\"?");
-  expect_refused({"friction", file("both.json", push("\"mass\"", "\"normal_force\": 3, \"mass\""))},
-                 {"/normal_force and /gravity both give the normal force"});
+  test::expect_refused({"friction", file("both.json", push("\"mass\"", "\"normal_force\": 3, \"mass\""))},
+                       {"/normal_force and /gravity both give the normal force"});
 }
 
 TEST(FrictionCommand, LawWithAJump_HoldsAndIsReported) {
@@ -252,13 +246,13 @@ TEST(FrictionCommand, LawThatGivesNaN_StopsWithItsRows) {
   EXPECT_TRUE(has(r.out, "\"stopped\"")) << r.out;
   EXPECT_EQ(test::read_file(csv), "t,x,v,F\n");
   const std::string word = file("word.json", push("\"F_C\": 1.0, \"F_S\": 1.5", "\"where\": \"foot\""));
-  expect_refused({"friction", word, "--law", tiny("tiny_nan")}, {"/params/where", "foot", "dft_dvt"});
+  test::expect_refused({"friction", word, "--law", tiny("tiny_nan")}, {"/params/where", "foot", "dft_dvt"});
 }
 
 TEST(FrictionCommand, InputsAndOtherFiles_AreNotOverwritten) {
   const std::string good = file("own.json", push()), text = test::read_file(good);
-  expect_refused({"friction", good, "--csv", good}, {"--csv", "would be overwritten"});
-  expect_refused({"friction", good, "--plot", folder() + "/own.txt"}, {"--plot", ".png"});
+  test::expect_refused({"friction", good, "--csv", good}, {"--csv", "would be overwritten"});
+  test::expect_refused({"friction", good, "--plot", folder() + "/own.txt"}, {"--plot", ".png"});
   EXPECT_EQ(test::read_file(good), text);
   test::write_file(folder() + "/own.csv", "measured\n");
   const test::CommandResult r =
@@ -277,7 +271,7 @@ TEST(FrictionCommand, DriveFasterThanItsSteps_IsRefused) {
   const std::string fast = file("fast.json", R"({"law": "coulomb",
     "params": {"mu": 0.5}, "mass": 1, "gravity": 9.81,
     "input": {"kind": "sine_velocity", "V": 0.02, "freq": 1e12, "T": 2, "dt": 0.002}})");
-  expect_refused({"friction", fast}, {"/input/freq", "--step"});
+  test::expect_refused({"friction", fast}, {"/input/freq", "--step"});
 }
 
 TEST(FrictionCommand, PlotWithoutMatplotlib_KeepsTheRows) {
@@ -312,11 +306,11 @@ TEST(FrictionCommand, Plot_WritesAPictureAndNothingElse) {
   ASSERT_TRUE(std::filesystem::exists(picture));
   EXPECT_EQ(test::read_file(picture).substr(1, 3), "PNG");
   EXPECT_FALSE(std::filesystem::exists(picture + ".rows") || std::filesystem::exists(picture + ".part"));
-  expect_refused({"friction", file("good.json", push()), "--plot", folder() + "/no/such/place.png"},
-                 {"no/such/place.png"});
-  expect_refused({"friction", file("good.json", push()), "--plot", folder() + "/no/such/place.png", "--csv",
-                  folder() + "/kept.csv", "--quiet"},
-                 {"no/such/place.png: cannot be written: No such file or directory"});
+  test::expect_refused({"friction", file("good.json", push()), "--plot", folder() + "/no/such/place.png"},
+                       {"no/such/place.png"});
+  test::expect_refused({"friction", file("good.json", push()), "--plot", folder() + "/no/such/place.png",
+                        "--csv", folder() + "/kept.csv", "--quiet"},
+                       {"no/such/place.png: cannot be written: No such file or directory"});
 }
 
 // As where a version manager's python3, which has no matplotlib, comes first in PATH, and its settings are in

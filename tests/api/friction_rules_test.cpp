@@ -37,14 +37,7 @@ struct Scene {
     for (int i = 0; i < steps; ++i) test::ok(dfm_world_step(w, 1e-4, nullptr));
   }
   dfm_status add(const char *a, const char *b, double mu, const char *law = "coulomb") const {
-    const dfm_param_value v{"mu", &mu, 1};
-    dfm_friction_def f{};
-    f.size = sizeof f;
-    f.between[0] = a;
-    f.between[1] = b;
-    f.law = law;
-    f.params = {sizeof(dfm_params), 1, &v};
-    return dfm_world_add_friction(w, &f);
+    return test::add_friction(w, law, {{"mu", mu}}, a, b);
   }
   dfm_status set(const char *a, const char *b, const char *key, double value) const {
     const dfm_param_value v{key, &value, 1};

@@ -522,7 +522,9 @@ TEST(Handles, HandleKind_IdentifiesWhatAReportNames) {
     EXPECT_EQ(dfm_handle_kind(none), uint32_t{DFM_HANDLE_NONE});
   const test::Stack s = test::make_stack(c);
   test::run(s.world, 10e-3, 1e-3);
-  for (const dfm_pair_report &p : test::pairs(s.world)) {
+  const auto pairs = test::pairs(s.world);
+  EXPECT_FALSE(pairs.empty());
+  for (const dfm_pair_report &p : pairs) {
     EXPECT_EQ(dfm_handle_kind(p.a), uint32_t{DFM_HANDLE_BODY});
     EXPECT_EQ(dfm_handle_kind(p.b), uint32_t(p.b == s.floor ? DFM_HANDLE_OBSTACLE : DFM_HANDLE_BODY));
   }

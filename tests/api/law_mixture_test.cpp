@@ -25,15 +25,7 @@ struct Mixture {
     law("upper", "floor", "dahl");
   }
   void law(const char *a, const char *b, const char *name) {
-    const double mu = 0.4;
-    const dfm_param_value v{"mu_C", &mu, 1};
-    dfm_friction_def f{};
-    f.size = sizeof f;
-    f.between[0] = a;
-    f.between[1] = b;
-    f.law = name;
-    f.params = {sizeof(dfm_params), 1, &v};
-    test::ok(dfm_world_add_friction(world, &f));
+    test::ok(test::add_friction(world, name, {{"mu_C", 0.4}}, a, b));
   }
   void run(int steps) {
     for (int i = 0; i < steps; ++i) test::ok(dfm_world_step(world, 1e-3, nullptr));

@@ -21,15 +21,6 @@ std::string own(const std::string &name) {
   return std::string(DEFORM_SOURCE_DIR) + "/tests/data/meshes/" + name;
 }
 bool has(const std::string &text, const std::string &word) { return text.find(word) != std::string::npos; }
-size_t lines(const std::string &text) { return size_t(std::count(text.begin(), text.end(), '\n')); }
-
-void expect_refused(const std::vector<std::string> &args, const std::vector<std::string> &words) {
-  const auto r = test::deform(args);
-  EXPECT_EQ(r.exit_code, 2);
-  EXPECT_EQ(lines(r.err), 1u) << r.err;
-  EXPECT_TRUE(r.out.empty()) << r.out;
-  for (const auto &word : words) EXPECT_TRUE(has(r.err, word)) << "no '" << word << "' in: " << r.err;
-}
 
 }  // namespace
 
@@ -295,15 +286,15 @@ TEST(MeshCommand, ConvertForeignFormat_ReadsItOrExplainsHow) {
       "max":[1,1,0],"min":[0,0,0]}]})");
   const auto r = test::deform({"mesh", "convert", file, out});
   if (has(r.err, "built without")) {
-    expect_refused({"mesh", "convert", file, out},
-                   {"triangle.gltf", ".gltf is read through assimp", "libassimp-dev", "DEFORM_ASSIMP=ON"});
+    test::expect_refused({"mesh", "convert", file, out}, {"triangle.gltf", ".gltf is read through assimp",
+                                                          "libassimp-dev", "DEFORM_ASSIMP=ON"});
     EXPECT_FALSE(std::filesystem::exists(out));
   } else {
     EXPECT_EQ(r.exit_code, 0) << r.err;
     EXPECT_TRUE(has(r.out, "triangle.obj: 3 points, 1 triangles")) << r.out;
     EXPECT_TRUE(has(r.err, "not kept: materials")) << r.err;
     test::write_file(file, "{\"asset\": ");
-    expect_refused({"mesh", "convert", file, out}, {"triangle.gltf"});
+    test::expect_refused({"mesh", "convert", file, out}, {"triangle.gltf"});
   }
 }
 
@@ -311,8 +302,8 @@ TEST(MeshCommand, SurfaceWithASpaceInItsName_IsFilledByTheCommandThatTheErrorNam
   const std::string ball = folder() + "/a ball.stl";
   ASSERT_EQ(test::deform({"mesh", "make", "ball", "--quiet", "--out", ball}).exit_code, 0);
   const std::string cells = folder() + "/a ball.vtu";
-  expect_refused({"mesh", "convert", ball, folder() + "/a ball.msh"},
-                 {"deform mesh fill '" + ball + "' --out '" + cells + "'"});
+  test::expect_refused({"mesh", "convert", ball, folder() + "/a ball.msh"},
+                       {"deform mesh fill '" + ball + "' --out '" + cells + "'"});
 }
 
 TEST(MeshCommand, Fill_PrintsTheBodyOfAScene) {
@@ -336,39 +327,44 @@ TEST(MeshCommand, BadInput_ExitsTwoWithOneSentence) {
   test::write_file(folder() + "/sheet.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
   test::write_file(folder() + "/line.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n");
   const std::string ball = folder() + "/never.msh", sheet = folder() + "/sheet.obj";
-  expect_refused({"mesh", "info", folder() + "/none.msh"}, {"none.msh", "No such file"});
-  expect_refused({"mesh", "info", folder()}, {"directory"});
-  expect_refused({"mesh", "info", folder() + "/flat.vtk"}, {"flat.vtk", "flat"});
-  expect_refused({"mesh", "info", folder() + "/points.obj"}, {"points.obj"});
-  expect_refused({"mesh", "info", folder() + "/line.obj"}, {"line.obj", "without area"});
-  expect_refused({"mesh", "convert", sheet, ball}, {"sheet.obj is a surface", "deform mesh fill"});
+  test::expect_refused({"mesh", "info", folder() + "/none.msh"}, {"none.msh", "No such file"});
+  test::expect_refused({"mesh", "info", folder()}, {"directory"});
+  test::expect_refused({"mesh", "info", folder() + "/flat.vtk"}, {"flat.vtk", "flat"});
+  test::expect_refused({"mesh", "info", folder() + "/points.obj"}, {"points.obj"});
+  test::expect_refused({"mesh", "info", folder() + "/line.obj"}, {"line.obj", "without area"});
+  test::expect_refused({"mesh", "convert", sheet, ball}, {"sheet.obj is a surface", "deform mesh fill"});
   EXPECT_FALSE(std::filesystem::exists(ball));
-  expect_refused({"mesh", "convert", sheet, folder() + "/x.xyz"}, {".xyz", ".obj"});
-  expect_refused({"mesh", "convert", own("cube_vtk20_ascii.vtk"), folder() + "/x.xyz"}, {"x.xyz", ".msh"});
-  expect_refused({"mesh", "make", "torus", "--out", ball}, {"torus", "surface", "fill"});
-  expect_refused({"mesh", "make", "ball", "--surface", "--out", ball}, {"never.msh", ".obj"});
-  expect_refused({"mesh", "make", "tube", "--inner", "0.3", "--radius", "0.2", "--out", ball},
-                 {"inner radius is 0.3 m"});
-  expect_refused({"mesh", "make", "torus", "--ring", "0.1", "--radius", "0.2", "--out", folder() + "/t.obj"},
-                 {"torus", "0.2 m"});
-  expect_refused({"mesh", "make", "ball", "--out", folder() + "/none/b.msh"}, {"none/b.msh", "No such file"});
-  expect_refused({"mesh", "make", "ball", "--out", ball, "--radius", "-1"}, {"radius", "-1", "above 0"});
-  expect_refused({"mesh", "make", "ball", "--out", ball, "--radius", "nan"}, {"radius"});
-  expect_refused({"mesh", "make", "ball", "--out", ball, "--cells", "0"}, {"cells is 0"});
-  expect_refused({"mesh", "make", "ball", "--out", folder() + "/b.obj", "--cells", "0"}, {"triangles is 0"});
+  test::expect_refused({"mesh", "convert", sheet, folder() + "/x.xyz"}, {".xyz", ".obj"});
+  test::expect_refused({"mesh", "convert", own("cube_vtk20_ascii.vtk"), folder() + "/x.xyz"},
+                       {"x.xyz", ".msh"});
+  test::expect_refused({"mesh", "make", "torus", "--out", ball}, {"torus", "surface", "fill"});
+  test::expect_refused({"mesh", "make", "ball", "--surface", "--out", ball}, {"never.msh", ".obj"});
+  test::expect_refused({"mesh", "make", "tube", "--inner", "0.3", "--radius", "0.2", "--out", ball},
+                       {"inner radius is 0.3 m"});
+  test::expect_refused(
+      {"mesh", "make", "torus", "--ring", "0.1", "--radius", "0.2", "--out", folder() + "/t.obj"},
+      {"torus", "0.2 m"});
+  test::expect_refused({"mesh", "make", "ball", "--out", folder() + "/none/b.msh"},
+                       {"none/b.msh", "No such file"});
+  test::expect_refused({"mesh", "make", "ball", "--out", ball, "--radius", "-1"},
+                       {"radius", "-1", "above 0"});
+  test::expect_refused({"mesh", "make", "ball", "--out", ball, "--radius", "nan"}, {"radius"});
+  test::expect_refused({"mesh", "make", "ball", "--out", ball, "--cells", "0"}, {"cells is 0"});
+  test::expect_refused({"mesh", "make", "ball", "--out", folder() + "/b.obj", "--cells", "0"},
+                       {"triangles is 0"});
   for (const char *wrong : {"-5", "1e9", "1.5", "many", "99999999999999999999"})
     for (const std::vector<std::string> &call :
          {std::vector<std::string>{"mesh", "make", "ball"}, {"mesh", "fill", sheet}}) {
       std::vector<std::string> args = call;
       args.insert(args.end(), {"--out", ball, "--cells", wrong});
-      expect_refused(args, {"--cells", "whole number", std::string("found \"") + wrong + "\""});
+      test::expect_refused(args, {"--cells", "whole number", std::string("found \"") + wrong + "\""});
     }
-  expect_refused({"mesh", "make", "ball", "--out", ball, "--radius", "wide"},
-                 {"--radius", "expected a number, found \"wide\""});
-  expect_refused({"mesh", "make", "ball"}, {"--out"});
-  expect_refused({"mesh", "make", "bal", "--out", ball}, {"bal", "ball"});
-  expect_refused({"mesh", "inof", ball}, {"inof", "info"});
-  expect_refused({"mesh"}, {"info"});
+  test::expect_refused({"mesh", "make", "ball", "--out", ball, "--radius", "wide"},
+                       {"--radius", "expected a number, found \"wide\""});
+  test::expect_refused({"mesh", "make", "ball"}, {"--out"});
+  test::expect_refused({"mesh", "make", "bal", "--out", ball}, {"bal", "ball"});
+  test::expect_refused({"mesh", "inof", ball}, {"inof", "info"});
+  test::expect_refused({"mesh"}, {"info"});
 }
 
 TEST(MeshApi, Read_ReportsWarningsAndLendsArrays) {

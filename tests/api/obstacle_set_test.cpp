@@ -19,11 +19,7 @@ struct OnATable {
     d.half_size[2] = 0.1;
     d.pose.position[2] = -0.1;
     test::ok(dfm_obstacle_create(world, &d, &table));
-    dfm_friction_def f{};
-    f.size = sizeof f;
-    f.between[0] = f.between[1] = "*";
-    f.law = law;
-    test::ok(dfm_world_add_friction(world, &f));
+    test::ok(test::add_friction(world, law));
     test::BodyOptions o;
     o.name = "block";
     o.young = 1e5;
@@ -183,12 +179,7 @@ TEST(ObstacleSet, Material_ChangesTheFriction) {
   test::ok(dfm_obstacle_set_material(floor, ice));
   const double free = run(0.1);
   EXPECT_NEAR(free, 0.3, 3e-3);  // 3 m/s2 and nothing that holds
-  dfm_friction_def f{};
-  f.size = sizeof f;
-  f.between[0] = "material=ice";
-  f.between[1] = "*";
-  f.law = "coulomb";
-  test::ok(dfm_world_add_friction(world, &f));
+  test::ok(test::add_friction(world, "coulomb", {}, "material=ice"));
   EXPECT_LT(run(0.5), 0.01);
   test::ok(dfm_obstacle_set_material(floor, 0));
   EXPECT_EQ(dfm_obstacle_set_material(floor, block), DFM_E_HANDLE);

@@ -253,10 +253,8 @@ TEST(Overlap, AfterSetStateAndRestore_IsFound) {
   const dfm_body b = ball(c, w, "b", {0.3, 0, 0});
   test::run(w, 0.01, 1e-3);
   EXPECT_TRUE(overlaps(w).empty());
-  uint32_t n = 0;
-  test::ok(dfm_body_get_state(b, 0, nullptr, nullptr, &n));
-  std::vector<double> x(3 * n), v(3 * n);
-  test::ok(dfm_body_get_state(b, n, x.data(), v.data(), &n));
+  auto [x, v] = test::State(b);
+  const uint32_t n = uint32_t(x.size() / 3);
   for (size_t i = 0; i < x.size(); i += 3) x[i] -= 0.2;
   test::ok(dfm_body_set_state(b, n, x.data(), nullptr));
   uint32_t trouble = 0;
@@ -354,10 +352,8 @@ TEST(Overlap, OfAPairThatTheHostMovesApart_HasContactAtOnce) {
   const dfm_world w = test::make_world(c, {});
   const dfm_body a = ball(c, w, "a", {}), b = ball(c, w, "b", {0.1, 0, 0});
   test::run(w, 1e-3, 1e-3);
-  uint32_t n = 0;
-  test::ok(dfm_body_get_state(a, 0, nullptr, nullptr, &n));
-  std::vector<double> x(3 * size_t{n});
-  test::ok(dfm_body_get_state(a, n, x.data(), nullptr, &n));
+  std::vector<double> x = test::State(a).x;
+  uint32_t n = uint32_t(x.size() / 3);
   for (size_t i = 0; i < x.size(); i += 3) x[i] -= 0.102;  // 2 mm from b
   test::ok(dfm_body_set_state(a, n, x.data(), nullptr));
   test::set_velocity(a, {2, 0, 0});

@@ -5,16 +5,15 @@
 #include "obstacle.h"
 #include "query.h"
 #include "stack.h"
+#include "vec.h"
 
 namespace {
 
-using Vec = std::array<double, 3>;
+using test::cross;
+using test::dot;
+using test::Vec;
 
 Vec operator-(Vec a, Vec b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-Vec cross(Vec a, Vec b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-double dot(Vec a, Vec b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 struct Hit {
   double distance;

@@ -120,11 +120,7 @@ struct Scene {
     test::ok(dfm_plugin_register_static(c, entry, "calling"));
     w = test::make_world(c);
     floor = test::add_plane(w, "floor");
-    dfm_friction_def f{};
-    f.size = sizeof f;
-    f.between[0] = f.between[1] = "*";
-    f.law = "test.calling";
-    test::ok(dfm_world_add_friction(w, &f));
+    test::ok(test::add_friction(w, "test.calling"));
     test::BodyOptions o;
     o.name = "block";
     o.young = 2e5;

@@ -52,15 +52,7 @@ dfm_world empty(dfm_context *c) {
 
 // Friction rule and contacts refer to these by name.
 void slip(dfm_world w, const char *a, const char *b) {
-  const double mu = 0.1;
-  const dfm_param_value v{"mu", &mu, 1};
-  dfm_friction_def f{};
-  f.size = sizeof f;
-  f.between[0] = a;
-  f.between[1] = b;
-  f.law = "coulomb";
-  f.params = {sizeof(dfm_params), 1, &v};
-  test::ok(dfm_world_add_friction(w, &f));
+  test::ok(test::add_friction(w, "coulomb", {{"mu", 0.1}}, a, b));
 }
 
 void expect_refused(dfm_world w, const std::string &data, const char *part) {

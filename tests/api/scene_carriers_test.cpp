@@ -116,10 +116,7 @@ struct Loaded {
     return i;
   }
   std::vector<double> points() const {
-    uint32_t n = 0;
-    test::ok(dfm_body_get_state(body, 0, nullptr, nullptr, &n));
-    std::vector<double> x(3 * size_t(n));
-    test::ok(dfm_body_get_state(body, n, x.data(), nullptr, &n));
+    const std::vector<double> x = test::State(body).x;
     return x;
   }
   std::string explain() const { return test::explain(world); }

@@ -53,17 +53,6 @@ test::CommandResult run(std::vector<std::string> arguments) {
   return result;
 }
 
-void expect_refused(const test::CommandResult &result, const std::vector<std::string> &parts,
-                    const std::string &what) {
-  EXPECT_EQ(result.exit_code, 2) << what << "\n" << result.err;
-  EXPECT_EQ(result.err.rfind("deform: ", 0), 0u) << what << "\n" << result.err;
-  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << what << ": one sentence, found\n"
-                                                                       << result.err;
-  for (const std::string &part : parts)
-    EXPECT_NE(result.err.find(part), std::string::npos) << what << ": expected " << part << " in\n"
-                                                        << result.err;
-}
-
 struct Case {
   const char *set;
   std::vector<std::string> parts;
@@ -73,7 +62,7 @@ void check(const std::vector<Case> &cases) {
   for (const Case &c : cases) {
     std::vector<std::string> parts = c.parts;
     parts.push_back("scene.json");
-    expect_refused(run({scene(), "--set", c.set}), parts, c.set);
+    test::expect_refused(run({scene(), "--set", c.set}), parts, c.set);
   }
 }
 
@@ -85,7 +74,7 @@ TEST(SceneErrors, TheSceneItself_Runs) {
 }
 
 TEST(SceneErrors, AMeshInPlaceOfTheScene_IsNamedWithTheSceneToWrite) {
-  expect_refused(
+  test::expect_refused(
       run({folder() + "/block.msh"}),
       {"block.msh: this is a mesh (MSH), and a scene is expected",
        "{\"name\": \"body\", \"mesh\": \"block.msh\"}", "deform mesh info ", folder() + "/block.msh"},
@@ -94,7 +83,7 @@ TEST(SceneErrors, AMeshInPlaceOfTheScene_IsNamedWithTheSceneToWrite) {
     const std::string file = folder() + "/a ball." + ending;
     if (std::string(ending) == "step") test::write_file(file, "ISO-10303-21;\n");
     else test::deform({"mesh", "make", "ball", "--cells", "100", "--quiet", "--out", file});
-    expect_refused(run({file}), {"this is a mesh (", "deform mesh info '" + file + "'"}, ending);
+    test::expect_refused(run({file}), {"this is a mesh (", "deform mesh info '" + file + "'"}, ending);
   }
 }
 
@@ -113,11 +102,11 @@ TEST(SceneErrors, UnknownKeys_NameTheNearest) {
 }
 
 TEST(SceneErrors, StepThatNeedsTooManySubSteps_IsRefusedBeforeTheRun) {
-  expect_refused(run({scene(), "--set", "/materials/gel/young=1e13", "--set",
-                      R"(/time={"duration":0.1,"step":0.1,"integrator":"symplectic_euler"})"}),
-                 {"scene.json: /time/step: a step of 0.1 s needs", "at most 10000 are taken",
-                  "body 'block', whose point", "move by tr_bdf2"},
-                 "step");
+  test::expect_refused(run({scene(), "--set", "/materials/gel/young=1e13", "--set",
+                            R"(/time={"duration":0.1,"step":0.1,"integrator":"symplectic_euler"})"}),
+                       {"scene.json: /time/step: a step of 0.1 s needs", "at most 10000 are taken",
+                        "body 'block', whose point", "move by tr_bdf2"},
+                       "step");
   EXPECT_EQ(
       run({scene(), "--set", "/materials/gel/young=1e13", "--set", R"(/time={"duration":0.1,"step":0.1})"})
           .exit_code,
@@ -248,7 +237,8 @@ TEST(SceneErrors, NotDelivered_IsNeverIgnored) {
       {"/time/integrator=\"verlet\"", "/time/integrator"},
       {"/bodies/0/pressure=5", "/bodies/0/pressure"}};
   for (const auto &[set, pointer] : later)
-    expect_refused(run({scene(), "--set", set}), {"not available yet: " + std::string(pointer) + "\n"}, set);
+    test::expect_refused(run({scene(), "--set", set}), {"not available yet: " + std::string(pointer) + "\n"},
+                         set);
 }
 
 TEST(SceneErrors, Files_AreRefusedWithTheirPlace) {
@@ -272,11 +262,11 @@ TEST(SceneErrors, Files_AreRefusedWithTheirPlace) {
   };
   for (const auto &[text, parts] : texts) {
     test::write_file(file, text);
-    expect_refused(run({file}), parts, text.substr(0, 40));
+    test::expect_refused(run({file}), parts, text.substr(0, 40));
   }
-  expect_refused(run({folder() + "/nothing.json"}), {"nothing.json", "No such file", "a scene file (JSON)"},
-                 "missing file");
-  expect_refused(run({folder()}), {"is a directory", "a scene file (JSON)"}, "a folder");
+  test::expect_refused(run({folder() + "/nothing.json"}),
+                       {"nothing.json", "No such file", "a scene file (JSON)"}, "missing file");
+  test::expect_refused(run({folder()}), {"is a directory", "a scene file (JSON)"}, "a folder");
 }
 
 TEST(SceneErrors, Arguments_AreRefused) {
@@ -299,14 +289,14 @@ TEST(SceneErrors, Arguments_AreRefused) {
   for (const auto &[arguments, parts] : calls) {
     std::string what;
     for (const std::string &a : arguments) what += a + " ";
-    expect_refused(test::deform(arguments), parts, what);
+    test::expect_refused(test::deform(arguments), parts, what);
   }
 }
 
 TEST(SceneErrors, OutputThatCannotBeWritten_IsRefused) {
   test::write_file(folder() + "/file", "in the way");
-  expect_refused(test::deform({"run", scene(), "--quiet", "--out", folder() + "/file"}), {folder() + "/file"},
-                 "a file has the unknown way of cutting");
+  test::expect_refused(test::deform({"run", scene(), "--quiet", "--out", folder() + "/file"}),
+                       {folder() + "/file"}, "a file has the unknown way of cutting");
 }
 
 TEST(SceneApi, Errors_LeakNothing) {

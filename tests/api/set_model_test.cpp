@@ -10,17 +10,7 @@ namespace {
 
 constexpr const char *kModels[] = {"msm", "corotational_fem", "linear_fem"};
 
-struct State {
-  std::vector<double> x, v;
-  bool operator==(const State &) const = default;
-};
-State state_of(dfm_body body) {
-  uint32_t n = 0;
-  test::ok(dfm_body_get_state(body, 0, nullptr, nullptr, &n));
-  State s{std::vector<double>(size_t(3) * n), std::vector<double>(size_t(3) * n)};
-  test::ok(dfm_body_get_state(body, n, s.x.data(), s.v.data(), &n));
-  return s;
-}
+using test::State;
 std::vector<double> surface_of(dfm_body body) { return test::listed(dfm_surface_positions, body, 3); }
 std::string model_of(dfm_body body) {
   dfm_body_info i{};
@@ -56,7 +46,7 @@ struct Flying {
     o.velocity = {0.3, -0.2, 0.1};
     o.spin = {1, 2, 3};
     body = test::make_body(context, world, "beam", {0.3, 0.1, 0.1}, 200, o);
-    State s = state_of(body);
+    State s = State(body);
     for (size_t i = 0; i < s.x.size(); i += 3) {  // its lowest bending, about
       const double along = s.x[i] / 0.3;
       s.v[i + 2] += 2 * (along * along - along + 1.0 / 6);
@@ -73,12 +63,12 @@ TEST(SetModel, InFlight_KeepsEveryPositionAndVelocityToTheBit) {
     test::run(f.world, 0.05, 1e-3);
     for (const char *model : {"corotational_fem", "linear_fem", "msm", "corotational_fem"}) {
       SCOPED_TRACE(model);
-      const State before = state_of(f.body);
+      const State before = State(f.body);
       const std::vector<double> surface = surface_of(f.body);
       const dfm_body_measure m = test::measure(f.body);
       test::ok(set_model(f.body, model));
       EXPECT_EQ(model_of(f.body), std::string("org.deform.") + model);
-      EXPECT_TRUE(before == state_of(f.body));
+      EXPECT_TRUE(before == State(f.body));
       EXPECT_EQ(surface, surface_of(f.body));
       const dfm_body_measure n = test::measure(f.body);
       EXPECT_EQ(std::memcmp(m.momentum, n.momentum, sizeof m.momentum), 0);
@@ -110,7 +100,7 @@ TEST(SetModel, BeforeTheFirstStep_IsABodyMadeSo) {
         test::run(changed.world, 5e-3, 1e-3);
         test::run(made.world, 5e-3, 1e-3);
         // linear_fem turns its rest shape as the body stands, which is as it was made but for rounding
-        const State a = state_of(changed.body), b = state_of(made.body);
+        const State a = State(changed.body), b = State(made.body);
         for (size_t i = 0; i < a.x.size(); ++i) ASSERT_NEAR(a.x[i], b.x[i], 1e-13);
         const bool same = dfm_world_hash(changed.world) == dfm_world_hash(made.world);
         EXPECT_TRUE(same || std::string(to) == "linear_fem");
@@ -122,7 +112,7 @@ TEST(SetModel, StepBound_IsThatOfTheNewModel) {
   for (const char *to : kModels) {
     Flying changed(DFM_INTEGRATOR_SYMPLECTIC_EULER, "msm"), made(DFM_INTEGRATOR_SYMPLECTIC_EULER, to);
     test::run(changed.world, 0.1, 1e-3);
-    const State s = state_of(changed.body);
+    const State s = State(changed.body);
     test::ok(dfm_body_set_state(made.body, uint32_t(s.x.size() / 3), s.x.data(), s.v.data()));
     test::ok(set_model(changed.body, to));
     double a = 0, b = 0;
@@ -162,7 +152,7 @@ TEST(SetModel, OfAClampedBar_KeepsTheDirectionOfTheClamp) {
     o.model = first;
     o.young = 2e5;
     const dfm_body b = test::make_body(c, w, "beam", {0.3, 0.1, 0.1}, 100, o);
-    const State s = state_of(b);
+    const State s = State(b);
     std::vector<uint32_t> held;
     for (uint32_t i = 0; 3 * i < s.x.size(); ++i)
       if (s.x[3 * i] < 1e-9) held.push_back(i);
@@ -400,7 +390,7 @@ TEST(SetModel, FieldsByCell_StayWithTheMesh) {
   test::ok(dfm_body_create(w, &d, &changed));
   d.model = "corotational_fem";
   test::ok(dfm_body_create(w, &d, &made));
-  State s = state_of(changed);
+  State s = State(changed);
   for (size_t i = 0; i < s.x.size(); i += 3) s.x[i] *= 1.05;
   for (const dfm_body b : {changed, made}) test::ok(dfm_body_set_state(b, d.npoint, s.x.data(), nullptr));
   test::ok(set_model(changed, "corotational_fem"));
@@ -462,7 +452,7 @@ TEST(SetModel, AnyModelFromAnyOther_TakesABlockOverInContact) {
       Slope s;
       test::ok(set_model(s.block, from.c_str()));
       test::run(s.world, 0.2, 1e-3);
-      const State before = state_of(s.block);
+      const State before = State(s.block);
       const dfm_body_measure m = test::measure(s.block);
       const dfm_status status = set_model(s.block, to.c_str());
       if (status == DFM_DISCARD) {  // a shape that the model does not know, by more than 1e-6 of the size
@@ -472,7 +462,7 @@ TEST(SetModel, AnyModelFromAnyOther_TakesABlockOverInContact) {
       } else {
         ASSERT_EQ(status, DFM_OK) << dfm_last_error();
       }
-      EXPECT_TRUE(before == state_of(s.block));
+      EXPECT_TRUE(before == State(s.block));
       test::ok(dfm_world_step(s.world, 1e-3, nullptr));
       EXPECT_FALSE(test::contacts(s.world).empty());
       test::run(s.world, 0.1, 1e-3);

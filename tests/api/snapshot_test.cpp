@@ -179,18 +179,13 @@ TEST(Snapshot, OfAWorldChangedWhileRunning_HoldsTheChanges) {
 TEST(Snapshot, AfterALawWithMemoryGaveWay_IsRestored) {
   test::Context c;
   const test::Stack s = build(c);
-  dfm_friction_def rule{};
-  rule.size = sizeof rule;
-  rule.between[0] = rule.between[1] = "*";
-  rule.law = "lugre";
-  test::ok(dfm_world_add_friction(s.world, &rule));
+  test::ok(test::add_friction(s.world, "lugre"));
   steps(s.world, 5);
   test::ok(dfm_body_destroy(s.upper));
   test::ok(dfm_body_destroy(s.lower));
   steps(s.world, 1);
   test::ok(dfm_world_remove_friction(s.world, "*", "*"));
-  rule.law = "coulomb";
-  test::ok(dfm_world_add_friction(s.world, &rule));
+  test::ok(test::add_friction(s.world, "coulomb"));
   const std::string data = snapshot(s.world);
   test::ok(restore(s.world, data));
 }

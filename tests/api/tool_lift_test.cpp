@@ -195,14 +195,7 @@ TEST(ToolLift, ANeedleThatIsTurned_StaysInTheJaws) {
 TEST(ToolLift, ALawWithMemory_IsASpring) {
   test::Context context;
   const dfm_world w = test::make_world(context, {0, 0, 0});
-  const double values[] = {0.5, 1e7};
-  const dfm_param_value params[] = {{"mu", &values[0], 1}, {"sigma0", &values[1], 1}};
-  dfm_friction_def f{};
-  f.size = sizeof f;
-  f.between[0] = f.between[1] = "*";
-  f.law = "elastoplastic";
-  f.params = {sizeof(dfm_params), 2, params};
-  test::ok(dfm_world_add_friction(w, &f));
+  test::ok(test::add_friction(w, "elastoplastic", {{"mu", 0.5}, {"sigma0", 1e7}}));
   dfm_tool_def d = table();
   make(w, d);
   d = dfm_tool_def_default();

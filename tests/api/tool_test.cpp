@@ -53,11 +53,7 @@ TEST(Tool, ForceTimesTheStep_IsTheMomentumThatTheBodyGot) {
       SCOPED_TRACE(std::string(law) + " " + std::to_string(dt));
       test::Context context;
       const dfm_world w = test::make_world(context, {0, 0, 0});
-      dfm_friction_def f{};
-      f.size = sizeof f;
-      f.between[0] = f.between[1] = "*";
-      f.law = law;
-      test::ok(dfm_world_add_friction(w, &f));
+      test::ok(test::add_friction(w, law));
       test::BodyOptions o;
       o.young = 3e4;
       o.damping_stiffness = 2e-3;
@@ -393,6 +389,13 @@ TEST(Tool, OfTwoJawsThatIsGone_LeavesAnAttachedBodyToItsObstacle) {
   test::ok(dfm_body_attach(s.block, &hold, nullptr));
   test::run(s.w, 5e-3, 1e-3);
   EXPECT_LT(test::measure(s.block).speed_max, 1e-9);
+  const double before = test::measure(s.block).com[2];
+  for (int i = 1; i <= 100; ++i) {  // and it follows its obstacle
+    const dfm_pose to = pose({0, 0, -0.021 + 1e-5 * i}, {0, 0, 1}, 0);
+    test::ok(dfm_obstacle_move_to(wall, &to));
+    test::run(s.w, 1e-3, 1e-3);
+  }
+  EXPECT_NEAR(test::measure(s.block).com[2] - before, 1e-3, 5e-4);
 }
 
 TEST(Tool, WrongArguments_AreNamed) {

@@ -427,11 +427,7 @@ TEST(WriteScene, RulesOfABodyInManyPieces_AreWrittenOncePerPair) {
   test::ok(dfm_world_filter_pair(world, "rod", "rod", true));
   test::ok(dfm_world_filter_pair(world, "rod", "floor", false));
   test::ok(dfm_world_filter_pair(world, "rod", "dust", false));
-  dfm_friction_def law{};
-  law.size = sizeof law;
-  law.between[0] = law.between[1] = "rod";
-  law.law = "coulomb";
-  test::ok(dfm_world_add_friction(world, &law));
+  test::ok(test::add_friction(world, "coulomb", {}, "rod", "rod"));
   dfm_cut_def all = dfm_cut_def_default();
   all.shape = DFM_CUT_BOX;
   std::fill(all.half_size, all.half_size + 3, 1);

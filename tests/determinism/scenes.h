@@ -201,16 +201,7 @@ inline dfm_world folded(dfm_context *c) {
 inline dfm_world remembered(dfm_context *c) {
   const dfm_world w = test::make_world(c);
   test::add_plane(w, "floor");
-  const auto law = [&](const char *a, const char *b, const char *name, std::vector<dfm_param_value> values) {
-    dfm_friction_def f{};
-    f.size = sizeof f;
-    f.between[0] = a;
-    f.between[1] = b;
-    f.law = name;
-    f.params = {sizeof(dfm_params), uint32_t(values.size()), values.data()};
-    test::ok(dfm_world_add_friction(w, &f));
-  };
-  const double low = 0.3, high = 0.9, soft = 1e7, bent = 1.5, cubic = 3;
+  const double low = 0.3, high = 0.9, soft = 1e7, bent = 1.5;
   test::BodyOptions o;
   o.young = 1e5;
   o.damping_stiffness = 1e-3;
@@ -226,12 +217,12 @@ inline dfm_world remembered(dfm_context *c) {
   o.velocity = {0.1, 0.05, -0.2};
   o.spin = {3, 1, 2};
   test::make_body(c, w, "ball", {0.04, 0, 0}, 100, o);
-  law("dahl", "floor", "dahl", {{"mu", &low, 1}, {"sigma0", &soft, 1}, {"alpha", &bent, 1}});
-  law("elastoplastic", "floor", "elastoplastic",
-      {{"mu_C", &low, 1}, {"mu_S", &high, 1}, {"sigma0", &soft, 1}, {"i", &cubic, 1}});
-  law("gms", "floor", "gms", {{"mu_C", &low, 1}, {"mu_S", &high, 1}});
-  law("ball", "dahl", "lugre",
-      {{"mu_C", &low, 1}, {"mu_S", &high, 1}, {"delta", &bent, 1}, {"sigma0", &soft, 1}});
+  test::ok(test::add_friction(w, "dahl", {{"mu", low}, {"sigma0", soft}, {"alpha", bent}}, "dahl", "floor"));
+  test::ok(test::add_friction(w, "elastoplastic", {{"mu_C", low}, {"mu_S", high}, {"sigma0", soft}, {"i", 3}},
+                              "elastoplastic", "floor"));
+  test::ok(test::add_friction(w, "gms", {{"mu_C", low}, {"mu_S", high}}, "gms", "floor"));
+  test::ok(test::add_friction(w, "lugre", {{"mu_C", low}, {"mu_S", high}, {"delta", bent}, {"sigma0", soft}},
+                              "ball", "dahl"));
   return w;
 }
 

@@ -520,24 +520,11 @@ TEST(MsmGpu, EdgesBeyondTheRangeOfAFloat_AreRefused) {
   EXPECT_NE(host.logged.find("edges of 1e-6 m to 1e4 m are expected"), std::string::npos) << host.logged;
 }
 
-TEST_P(Gpu, FailingAllocator_LeavesNothingBehind) {
+TEST_P(Gpu, RefusedMemory_LeavesNothingBehind) {
   const Mesh m = kuhn_bar(2, 2, 2, 0.02);
-  size_t calls = 0;
-  {
-    Host counting;
-    Stepper body(counting, gpu(GetParam()), m, with(GetParam(), {{"device", reference}}));
-    calls = counting.calls;
-  }
-  for (size_t n = 0; n < calls; ++n) {
-    Host host;
-    host.fail_at = n;
-    {
-      Stepper body(host, gpu(GetParam()), m, with(GetParam(), {{"device", reference}}));
-      EXPECT_EQ(body.status, DFM_E_NOMEM) << n;
-      body.self = nullptr;
-    }
-    EXPECT_EQ(host.live, 0u) << n;
-  }
+  refuse_each_allocation([&](Host &host) {
+    return Stepper(host, gpu(GetParam()), m, with(GetParam(), {{"device", reference}}));
+  });
 }
 
 }  // namespace

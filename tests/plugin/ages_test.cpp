@@ -235,10 +235,7 @@ struct World {
   }
   std::vector<double> after(double seconds) {
     test::run(world, seconds, 1e-3);
-    uint32_t n = 0;
-    test::ok(dfm_body_get_state(body, 0, nullptr, nullptr, &n));
-    std::vector<double> x(3 * size_t(n)), v(3 * size_t(n));
-    test::ok(dfm_body_get_state(body, n, x.data(), v.data(), &n));
+    auto [x, v] = test::State(body);
     x.insert(x.end(), v.begin(), v.end());
     return x;
   }

@@ -27,11 +27,7 @@ struct BlockWorld {
     o.position = {0, 0, b.z};
     body = make_body(context, world, "beam", {0.2, 0.1, 0.1}, 120, o);
     add_plane(world, "floor");
-    dfm_friction_def f{};
-    f.size = sizeof f;
-    f.between[0] = f.between[1] = "*";
-    f.law = b.law;
-    ok(dfm_world_add_friction(world, &f));
+    ok(add_friction(world, b.law));
   }
   ~BlockWorld() { dfm_world_destroy(world); }
 };

@@ -65,4 +65,49 @@ inline Table read(const std::string &file) {
   return table;
 }
 
+// At 9.8 N, for each speed of the reference's curve; z: the column of the deflection, where the law has one.
+inline void expect_steady_curve(const Law &law, const char *force, const char *z = nullptr) {
+  const Table t = read("curves_steady.csv");
+  for (size_t i = 1; i < t.size(); ++i) {
+    const double v = t.at(i, "v");
+    if (v == 0) continue;
+    Contact k(law, 9.8);
+    for (int n = 0; n < 100; ++n) k.move(v, 0, 1e-2 / std::fabs(v));
+    EXPECT_NEAR(k.last.f[0], t.at(i, force), 2e-12);
+    if (z) {
+      EXPECT_NEAR(k.last.state[0], t.at(i, z), 1e-15);
+    }
+  }
+}
+
+// A contact that slid at 9.8 N and is left with 1 N: the force is at once mu of that.
+inline Contact expect_cut_by_falling_force(const Law &law, double mu) {
+  Contact k(law, 9.8);
+  k.path(1e-2, 100, 1e-4);
+  k.in.fn = 1;
+  k.move(0, 0, 1e-3);
+  EXPECT_NEAR(k.last.f[0], mu, 1e-15);
+  return k;
+}
+
+// As the normal force vanishes the force goes with it, as mu(w) fn v^, and the derivative stays that of a
+// cone: nothing divides by fn. For mu_C 0.15, mu_S 0.2, v_s 0.01 m/s, delta 2, no sigma2.
+inline void expect_cone_at_vanishing_force(const Law &law) {
+  for (double w : {1e-4, 0.01, 1.0})
+    for (double fn : {1e-9, 1e-30, 1e-100, 1e-139}) {
+      In in;
+      in.fn = fn;
+      in.v[0] = 0.6 * w;
+      in.v[1] = -0.8 * w;
+      in.state[0] = 3e-5;
+      in.state[1] = 1e-5;
+      const Out o = evaluate(law, in);
+      const double mu = 0.15 + 0.05 * std::exp(-w * w / 1e-4);
+      EXPECT_NEAR(o.f[0] / fn, 0.6 * mu, 1e-4 * mu) << w << " " << fn;
+      EXPECT_NEAR(o.f[1] / fn, -0.8 * mu, 1e-4 * mu);
+      EXPECT_NEAR(o.dn[0], 0.6 * mu, 1e-4 * mu);
+      EXPECT_NEAR(o.dn[1], -0.8 * mu, 1e-4 * mu);
+    }
+}
+
 }  // namespace rig

@@ -22,14 +22,7 @@ struct World {
     o.position = {-0.05, -0.05, 2e-5};
     body = test::make_body(context, world, "beam", {0.1, 0.1, 0.1}, cells, o);
     test::add_plane(world, "floor");
-    const double mu = 0.5;
-    const dfm_param_value values[] = {{"mu", &mu, 1}, {"sigma0", &sigma0, 1}};
-    dfm_friction_def f{};
-    f.size = sizeof f;
-    f.between[0] = f.between[1] = "*";
-    f.law = "test.bristle";
-    f.params = {sizeof(dfm_params), 2, values};
-    test::ok(dfm_world_add_friction(world, &f));
+    test::ok(test::add_friction(world, "test.bristle", {{"mu", 0.5}, {"sigma0", sigma0}}));
   }
   std::vector<dfm_contact> contacts() {
     std::vector<dfm_contact> c(512);

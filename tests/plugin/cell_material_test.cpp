@@ -316,19 +316,9 @@ TEST(CellMaterial, Flow_DoesNotDependOnTheDivisionOfTheWork) {
   EXPECT_GT(*std::max_element(a.state.begin(), a.state.end()), 0);
 }
 
-TEST(CellMaterial, MemoryThatRunsOut_IsReportedAndGivenBack) {
+TEST(CellMaterial, RefusedMemory_LeavesNothingBehind) {
   const Mesh m = brick_bar(2, 1, 1, {0.1, 0.1, 0.1});
-  bool made = false;
-  for (size_t n = 0; !made; ++n) {
-    Host host;
-    host.fail_at = n;
-    {
-      const Instance b(host, m, soft());
-      made = b.status == DFM_OK;
-      EXPECT_TRUE(made || b.status == DFM_E_NOMEM) << n;
-    }
-    EXPECT_EQ(host.live, 0u) << n;
-  }
+  refuse_each_allocation([&](Host &host) { return Instance(host, m, soft()); });
 }
 
 TEST(CellMaterial, Refusals_GiveTheReason) {

@@ -219,22 +219,7 @@ TEST_F(Elastoplastic, SlidingForLong_IsTheSteadyCurveAtAnyStep) {
 
 TEST_F(Elastoplastic, VanishingNormalForce_LeavesTheSlopeOfTheCone) {
   for (double multiplier : {0.0, 1.0})
-    for (double w : {1e-4, 0.01, 1.0})
-      for (double fn : {1e-9, 1e-30, 1e-100, 1e-139}) {
-        In in;
-        in.fn = fn;
-        in.v[0] = 0.6 * w;
-        in.v[1] = -0.8 * w;
-        in.state[0] = 3e-5;
-        in.state[1] = 1e-5;
-        const Out o =
-            rules::evaluate(make({0.15, 0.20, 0.01, 2, 1e4, 20, 0, 0.01, 0, 0.7, 1, multiplier}), in);
-        const double mu = 0.15 + 0.05 * std::exp(-w * w / 1e-4);
-        EXPECT_NEAR(o.f[0] / fn, 0.6 * mu, 1e-4 * mu) << w << " " << fn;
-        EXPECT_NEAR(o.f[1] / fn, -0.8 * mu, 1e-4 * mu);
-        EXPECT_NEAR(o.dn[0], 0.6 * mu, 1e-4 * mu);
-        EXPECT_NEAR(o.dn[1], -0.8 * mu, 1e-4 * mu);
-      }
+    rig::expect_cone_at_vanishing_force(make({0.15, 0.20, 0.01, 2, 1e4, 20, 0, 0.01, 0, 0.7, 1, multiplier}));
 }
 
 TEST_F(Elastoplastic, NearlyRigidBristles_StayBoundedAndPassiveAtEveryStep) {
@@ -266,13 +251,7 @@ TEST_F(Elastoplastic, HeldAtAnyLoad_KeepsItsBristleToTheBit) {
   }
 }
 
-TEST_F(Elastoplastic, FallingNormalForce_CutsTheBristleFirst) {
-  Contact k(dev, 9.8);
-  k.path(1e-2, 100, 1e-4);
-  k.in.fn = 1;
-  k.move(0, 0, 1e-3);
-  EXPECT_NEAR(k.last.f[0], 0.20, 1e-15);
-}
+TEST_F(Elastoplastic, FallingNormalForce_CutsTheBristleFirst) { rig::expect_cut_by_falling_force(dev, 0.20); }
 
 // The yield share alpha out of one small step at a held speed: m = w - g dz/dt /(K0 z), as the file's table
 // gives it for both directions of motion.
@@ -300,52 +279,7 @@ TEST_F(Elastoplastic, AlphaMap_MatchesTheReference) {
 }
 
 TEST_F(Elastoplastic, SteadyCurve_MatchesTheReference) {
-  const rig::Table t = rig::read("curves_steady.csv");
-  for (size_t i = 1; i < t.size(); ++i) {
-    const double v = t.at(i, "v");
-    if (v == 0) continue;
-    Contact k(dev, 9.8);
-    for (int n = 0; n < 100; ++n) k.move(v, 0, 1e-2 / std::fabs(v));
-    EXPECT_NEAR(k.last.f[0], t.at(i, "F_steady_lugre_ep_coulomb"), 2e-12);
-  }
-}
-
-TEST_F(Elastoplastic, TurnOfTheSlip_ConvergesToBothReferences) {
-  for (const Law &l : {constant, cosine}) {
-    const rig::Table t =
-        rig::read(l.params[11] > 0 ? "vector_turn_ep_cosine.csv" : "vector_turn_ep_associated.csv");
-    double before = 0;
-    for (int parts : {20, 40}) {
-      Contact k(l, 9.8);
-      double worst = 0;
-      for (size_t i = 2; i < t.size(); ++i) {
-        const double t0 = t.at(i - 1, "t"), t1 = t.at(i, "t"), h = (t1 - t0) / parts;
-        for (int n = 1; n <= parts; ++n) {
-          const double angle = t0 + n * h > 0.2 ? kPi / 2 : 0;
-          k.move(5e-3 * std::cos(angle), 5e-3 * std::sin(angle), h);
-        }
-        if (std::fabs(t1 - 0.2) > 0.01)
-          worst = std::max(
-              {worst, std::fabs(k.last.f[0] - t.at(i, "Fx")), std::fabs(k.last.f[1] - t.at(i, "Fy"))});
-      }
-      EXPECT_LT(worst, 0.02);
-      if (before > 0) {
-        EXPECT_NEAR(before / worst, 2, 0.3);
-      }
-      before = worst;
-    }
-  }
-}
-
-TEST_F(Elastoplastic, PreslidingLoops_MatchTheReference) {
-  const rig::Table t = rig::read("presliding.csv");
-  Contact k(make({0.15, 0.20, 0.01, 2, 1e4, 0, 0, 0.01, 0, 0.7, 1, 0}), 9.8);
-  double worst = 0;
-  for (size_t i = 2; i < t.size(); ++i) {
-    const double f = k.path(t.at(i, "x") - t.at(i - 1, "x"), 200, 1e-6);
-    worst = std::max(worst, std::fabs(f - t.at(i, "F_ep_rate_independent")));
-  }
-  EXPECT_LT(worst, 1e-3);
+  rig::expect_steady_curve(dev, "F_steady_lugre_ep_coulomb");
 }
 
 }  // namespace

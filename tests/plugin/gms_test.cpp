@@ -229,30 +229,7 @@ TEST_F(Gms, NearlyRigidElements_StayBoundedAndPassiveAtEveryStep) {
   }
 }
 
-TEST_F(Gms, FallingNormalForce_CutsTheElementsFirst) {
-  Contact k(dev, 9.8);
-  k.path(1e-2, 100, 1e-4);
-  k.in.fn = 1;
-  k.move(0, 0, 1e-3);
-  EXPECT_NEAR(k.last.f[0], 0.20, 1e-15);
-}
-
-TEST_F(Gms, SineVelocities_ConvergeToTheReference) {
-  for (const auto &[file, speed] : {std::pair{"sinvel_V1_gms.csv", 0.01},
-                                    {"sinvel_V2_gms.csv", 0.02},
-                                    {"sinvel_presliding_gms.csv", 0.0004}}) {
-    const rig::Table t = rig::read(file);
-    double top = 0, worst = 0;
-    Contact k(dev, 9.8);
-    for (size_t i = 2; i < t.size(); ++i) {
-      const double t0 = t.at(i - 1, "t"), h = (t.at(i, "t") - t0) / 100;  // 1e-4 s
-      for (int n = 1; n <= 100; ++n) k.move(speed * std::sin(2 * kPi * (t0 + n * h)), 0, h);
-      top = std::max(top, std::fabs(t.at(i, "F")));
-      worst = std::max(worst, std::fabs(k.last.f[0] - t.at(i, "F")));
-    }
-    EXPECT_LT(worst, 2e-3 * top) << file;
-  }
-}
+TEST_F(Gms, FallingNormalForce_CutsTheElementsFirst) { rig::expect_cut_by_falling_force(dev, 0.20); }
 
 TEST_F(Gms, PreslidingLoops_MatchTheReference) {
   const rig::Table t = rig::read("presliding.csv");

@@ -67,10 +67,8 @@ TEST(LinearFemWorld, BodyThatTurns_ReportsThatItLeavesItsRange) {
   o.model = "linear_fem";
   o.young = 1e4;
   const dfm_body top = test::make_body(logged.context, world, "ball", {0.1}, 100, o);
-  uint32_t n = 0;
-  test::ok(dfm_body_get_state(top, 0, nullptr, nullptr, &n));
-  std::vector<double> rest(size_t(3) * n);
-  test::ok(dfm_body_get_state(top, n, rest.data(), nullptr, &n));
+  const std::vector<double> rest = test::State(top).x;
+  const uint32_t n = uint32_t(rest.size() / 3);
   const auto reported = [&](double tangent) {
     std::vector<double> x = rest;
     for (size_t i = 0; i < x.size(); i += 3) {

@@ -123,26 +123,9 @@ TEST_F(Lugre, SlidingForLong_IsTheSteadyCurveAtAnyStep) {
     }
 }
 
-// As the normal force vanishes the force goes with it, as mu(w) fn v^, and the derivative stays that of a
-// cone: nothing divides by fn.
 TEST_F(Lugre, VanishingNormalForce_LeavesTheSlopeOfTheCone) {
-  for (const Law &l :
-       {make({0.15, 0.20, 0.01, 2, 1e4, 20, 0, 0.01, 0}), make({0.15, 0.20, 0.01, 2, 1e9, 0, 0, 0.01, 0})})
-    for (double w : {1e-4, 0.01, 1.0})
-      for (double fn : {1e-9, 1e-30, 1e-100, 1e-139}) {
-        In in;
-        in.fn = fn;
-        in.v[0] = 0.6 * w;
-        in.v[1] = -0.8 * w;
-        in.state[0] = 3e-5;
-        in.state[1] = 1e-5;
-        const Out o = rules::evaluate(l, in);
-        const double mu = 0.15 + 0.05 * std::exp(-w * w / 1e-4);
-        EXPECT_NEAR(o.f[0] / fn, 0.6 * mu, 1e-4 * mu) << w << " " << fn;
-        EXPECT_NEAR(o.f[1] / fn, -0.8 * mu, 1e-4 * mu);
-        EXPECT_NEAR(o.dn[0], 0.6 * mu, 1e-4 * mu);
-        EXPECT_NEAR(o.dn[1], -0.8 * mu, 1e-4 * mu);
-      }
+  rig::expect_cone_at_vanishing_force(make({0.15, 0.20, 0.01, 2, 1e4, 20, 0, 0.01, 0}));
+  rig::expect_cone_at_vanishing_force(make({0.15, 0.20, 0.01, 2, 1e9, 0, 0, 0.01, 0}));
 }
 
 TEST_F(Lugre, NearlyRigidBristles_StayBoundedAndPassiveAtEveryStep) {
@@ -204,11 +187,7 @@ TEST_F(Lugre, BiasedLoadBelowTheLevel_DriftsByTheClosedForm) {
 }
 
 TEST_F(Lugre, FallingNormalForce_CutsTheBristleFirst) {
-  Contact k(dev, 9.8);
-  k.path(1e-2, 100, 1e-4);
-  k.in.fn = 1;
-  k.move(0, 0, 1e-3);
-  EXPECT_NEAR(k.last.f[0], 0.20, 1e-15) << "1.94 N where the projection comes last";
+  rig::expect_cut_by_falling_force(dev, 0.20);  // 1.94 N where the projection comes last
 }
 
 // The loop of force over speed widens with the frequency: the frictional lag.
@@ -233,78 +212,7 @@ TEST_F(Lugre, FasterChangeOfSpeed_LagsMore) {
 }
 
 TEST_F(Lugre, SteadyCurve_MatchesTheReference) {
-  const rig::Table t = rig::read("curves_steady.csv");
-  for (size_t i = 1; i < t.size(); ++i) {
-    const double v = t.at(i, "v");
-    if (v == 0) continue;
-    Contact k(dev, 9.8);
-    for (int n = 0; n < 100; ++n) k.move(v, 0, 1e-2 / std::fabs(v));
-    EXPECT_NEAR(k.last.f[0], t.at(i, "F_steady_lugre_ep_coulomb"), 2e-12);
-    EXPECT_NEAR(k.last.state[0], t.at(i, "z_steady_lugre"), 1e-15);
-  }
-}
-
-// Histories at prescribed velocity: first order in the step, so the error halves with it.
-TEST_F(Lugre, CircleAndTurn_ConvergeToTheReference) {
-  for (const char *file : {"vector_circle_lugre.csv", "vector_turn_lugre.csv"}) {
-    const rig::Table t = rig::read(file);
-    const bool circle = std::string(file).find("circle") != std::string::npos;
-    double before = 0;
-    for (int parts : {20, 40}) {
-      Contact k(constant, 9.8);
-      double worst = 0;
-      for (size_t i = 2; i < t.size(); ++i) {
-        const double t0 = t.at(i - 1, "t"), t1 = t.at(i, "t"), h = (t1 - t0) / parts;
-        for (int n = 1; n <= parts; ++n) {
-          const double s = t0 + n * h, angle = circle ? 10 * s : s > 0.2 ? kPi / 2 : 0;
-          k.move(5e-3 * std::cos(angle), 5e-3 * std::sin(angle), h);
-        }
-        // the file holds dz/dt at the row's own time
-        if (circle || std::fabs(t1 - 0.2) > 0.01)
-          worst = std::max(
-              {worst, std::fabs(k.last.f[0] - t.at(i, "Fx")), std::fabs(k.last.f[1] - t.at(i, "Fy"))});
-      }
-      EXPECT_LT(worst, 0.02) << file;
-      if (before > 0) {
-        EXPECT_NEAR(before / worst, 2, 0.3) << file;
-      }
-      before = worst;
-    }
-  }
-}
-
-TEST_F(Lugre, VaryingNormalForce_MatchesTheProjectedReference) {
-  const rig::Table t = rig::read("normal_load_lugre_projected.csv");
-  double before = 0;
-  for (int parts : {50, 100}) {
-    Contact k(make({0.15, 0.20, 0.01, 2, 1e4, 0, 0, 0.01, 0}), 9.8);
-    double worst = 0;
-    for (size_t i = 2; i < t.size(); ++i) {
-      const double t0 = t.at(i - 1, "t"), h = (t.at(i, "t") - t0) / parts;
-      for (int n = 1; n <= parts; ++n) {
-        const double s = t0 + n * h;
-        k.in.fn = 9.8 * (1 + 1.3 * std::sin(6 * kPi * s));
-        k.move(0.01 * std::sin(2 * kPi * s + 0.6), 0, h);
-      }
-      worst = std::max(worst, std::fabs(k.last.f[0] - t.at(i, "F_elastic")));
-    }
-    EXPECT_LT(worst, 0.05);
-    if (before > 0) {
-      EXPECT_NEAR(before / worst, 2, 0.3);
-    }
-    before = worst;
-  }
-}
-
-TEST_F(Lugre, PreslidingLoops_MatchTheReference) {
-  const rig::Table t = rig::read("presliding.csv");
-  Contact k(make({0.15, 0.20, 0.01, 2, 1e4, 0, 0, 0.01, 0}), 9.8);
-  double worst = 0;
-  for (size_t i = 2; i < t.size(); ++i) {
-    const double f = k.path(t.at(i, "x") - t.at(i - 1, "x"), 200, 1e-5);
-    worst = std::max(worst, std::fabs(f - t.at(i, "F_lugre_at_v_q")));
-  }
-  EXPECT_LT(worst, 1e-3);
+  rig::expect_steady_curve(dev, "F_steady_lugre_ep_coulomb", "z_steady_lugre");
 }
 
 }  // namespace

@@ -22,18 +22,17 @@
 #include <vector>
 
 #include "support.h"
+#include "vec.h"
 
 namespace model_test {
 
-using Vec = std::array<double, 3>;
+using test::cross;
+using test::dot;
+using test::norm;
+using test::Vec;
 inline Vec operator+(Vec a, Vec b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
 inline Vec operator-(Vec a, Vec b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
 inline Vec operator*(double s, Vec a) { return {s * a[0], s * a[1], s * a[2]}; }
-inline double dot(Vec a, Vec b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-inline Vec cross(Vec a, Vec b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-inline double norm(Vec a) { return std::sqrt(dot(a, a)); }
 
 // What stays as it is behind the end of each allocation.
 constexpr size_t kBehind = 256;
@@ -285,10 +284,29 @@ inline Mesh read_msh(const std::string &path) {
 
 using Fields = std::map<std::string, std::vector<double>>;
 
+// Each point is a surfel; blended: each surfel hangs on three points.
+struct Coupling {
+  std::vector<uint32_t> row{0}, col;
+  std::vector<double> weight;
+  Coupling(uint32_t n, bool blended) {
+    std::mt19937 random(3);
+    std::uniform_real_distribution<double> u(0.1, 1);
+    for (uint32_t i = 0; i < n; ++i) {
+      const double a = u(random), b = u(random);
+      for (uint32_t k = 0; k < (blended ? 3u : 1u); ++k) {
+        col.push_back((i + 5 * k) % n);
+        weight.push_back(!blended ? 1 : k == 0 ? a : k == 1 ? b * (1 - a) : (1 - b) * (1 - a));
+      }
+      row.push_back(uint32_t(col.size()));
+    }
+  }
+};
+
 // An instance with its point arrays. x starts at rest, v at zero.
 struct ModelInstance {
   Host &host;
   Mesh mesh;
+  Coupling coupling;
   uint32_t stride;
   const dfm_model *ops;
   void *self = nullptr;
@@ -299,8 +317,13 @@ struct ModelInstance {
   double dt = 1e-3, t = 0;
 
   ModelInstance(Host &h, const dfm_type &type, const Mesh &m, const std::vector<double> &params,
-                uint32_t s = 4, const Fields &by_cell = {}, const std::vector<uint8_t> &fixed = {})
-      : host(h), mesh(m), stride(s), ops(static_cast<const dfm_model *>(type.ops)) {
+                uint32_t s = 4, const Fields &by_cell = {}, const std::vector<uint8_t> &fixed = {},
+                bool blended = false)
+      : host(h),
+        mesh(m),
+        coupling(m.npoint(), blended),
+        stride(s),
+        ops(static_cast<const dfm_model *>(type.ops)) {
     std::vector<const char *> keys;
     std::vector<const double *> fields;
     for (const auto &[key, values] : by_cell) {
@@ -312,14 +335,10 @@ struct ModelInstance {
     d.field_keys = keys.data();
     d.fields = fields.data();
     d.params = params.data();
-    // every point is a surfel
-    std::vector<uint32_t> row(m.npoint() + 1), col(m.npoint());
-    for (uint32_t i = 0; i < m.npoint(); ++i) row[i + 1] = (col[i] = i) + 1;
-    const std::vector<double> weight(m.npoint(), 1);
     d.nsurfel = m.npoint();
-    d.row = row.data();
-    d.col = col.data();
-    d.weight = weight.data();
+    d.row = coupling.row.data();
+    d.col = coupling.col.data();
+    d.weight = coupling.weight.data();
     d.fixed = fixed.empty() ? nullptr : fixed.data();
     status = ops->create(&h.table, &d, &self);
     double **to[] = {&x, &v, &f};
@@ -426,6 +445,28 @@ struct ModelInstance {
     std::copy(start.begin(), start.end(), x);
   }
 };
+
+// A body that `make` creates on a host, without each of its allocations in turn: out of memory is what it
+// says, and nothing is left behind. Returns how many there are.
+template <class Make>
+size_t refuse_each_allocation(Make make) {
+  size_t calls = 0;
+  {
+    Host host;
+    const auto body = make(host);
+    EXPECT_EQ(body.status, DFM_OK) << host.logged;
+    calls = host.calls;
+  }
+  EXPECT_GT(calls, 0u);
+  for (size_t n = 0; n < calls; ++n) {
+    Host host;
+    host.fail_at = n;
+    const auto body = make(host);
+    EXPECT_EQ(body.status, DFM_E_NOMEM) << n;
+    EXPECT_EQ(host.live, 0u) << n;
+  }
+  return calls;
+}
 
 // J, from the energy per volume of each cell.
 inline double energy_of_cells(ModelInstance &b) {

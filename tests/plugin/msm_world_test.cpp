@@ -29,17 +29,8 @@ struct Scene {
     for (int n = 0; n < steps && status == DFM_OK; ++n) status = dfm_world_step(world, 1e-3, nullptr);
     return status;
   }
-  std::string text(dfm_status (*call)(dfm_world, char *, size_t *)) const {
-    size_t bytes = 0;
-    test::ok(call(world, nullptr, &bytes));
-    std::string out(bytes, 0);
-    test::ok(call(world, out.data(), &bytes));
-    return out;
-  }
-  std::string plan() const { return text(dfm_world_explain); }
-  std::string snapshot() const {
-    return text([](dfm_world w, char *to, size_t *bytes) { return dfm_world_snapshot(w, to, bytes); });
-  }
+  std::string plan() const { return test::explain(world); }
+  std::string snapshot() const { return test::snapshot(world); }
 };
 
 // Among the effects of the plan; bodies, which come later, list what their models could do.

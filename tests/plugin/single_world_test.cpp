@@ -41,21 +41,12 @@ struct Beam {
   void advance(int steps) {
     for (int n = 0; n < steps; ++n) test::ok(dfm_world_step(world, 1e-3, nullptr));
   }
-  std::string text(dfm_status (*call)(dfm_world, char *, size_t *)) const {
-    size_t bytes = 0;
-    test::ok(call(world, nullptr, &bytes));
-    std::string out(bytes, 0);
-    test::ok(call(world, out.data(), &bytes));
-    return out;
-  }
   std::string precision() const {
-    const std::string plan = text(dfm_world_explain), word = "\"precision\":{\"used\":\"";
+    const std::string plan = test::explain(world), word = "\"precision\":{\"used\":\"";
     const size_t at = plan.find(word);
     return at == std::string::npos ? "" : plan.substr(at + word.size(), 6);
   }
-  std::string snapshot() const {
-    return text([](dfm_world w, char *to, size_t *bytes) { return dfm_world_snapshot(w, to, bytes); });
-  }
+  std::string snapshot() const { return test::snapshot(world); }
   std::array<double, 3> com() const {
     dfm_body_measure m{};
     m.size = sizeof m;
@@ -131,7 +122,7 @@ TEST(Single, ImplicitSteps_StayDoubleAndReportIt) {
   b.advance(5);
   plain.advance(5);
   EXPECT_EQ(b.precision(), "double");
-  EXPECT_NE(b.text(dfm_world_explain).find("implicit steps take forces in double"), std::string::npos);
+  EXPECT_NE(test::explain(b.world).find("implicit steps take forces in double"), std::string::npos);
   EXPECT_EQ(b.com(), plain.com());
 }
 

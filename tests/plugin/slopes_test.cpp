@@ -44,14 +44,7 @@ Slide slide(bool derivatives) {
   test::ok(dfm_plugin_register_static(c, entry, "counted"));
   const dfm_world w = test::make_world(c);
   test::add_plane(w, "floor");
-  const double mu = 0.4, sigma0 = 1e8;
-  const dfm_param_value values[] = {{"mu", &mu, 1}, {"sigma0", &sigma0, 1}};
-  dfm_friction_def f{};
-  f.size = sizeof f;
-  f.between[0] = f.between[1] = "*";
-  f.law = "test.counted";
-  f.params = {sizeof(dfm_params), 2, values};
-  test::ok(dfm_world_add_friction(w, &f));
+  test::ok(test::add_friction(w, "test.counted", {{"mu", 0.4}, {"sigma0", 1e8}}));
   test::BodyOptions o;
   o.name = "block";
   o.young = 1e5;

@@ -146,11 +146,7 @@ using test::says;
 TEST(StepFailure, OfALaw_EndsTheStepAndKeepsTheState) {
   Host h;
   const test::Stack s = test::make_stack(h.c);
-  dfm_friction_def f{};
-  f.size = sizeof f;
-  f.between[0] = f.between[1] = "*";
-  f.law = "test.bad_law";
-  test::ok(dfm_world_add_friction(s.world, &f));
+  test::ok(test::add_friction(s.world, "test.bad_law"));
   test::run(s.world, 0.05, 1e-3);
   for (const Way way : {Way::throws, Way::fails, Way::nan_force, Way::nan_limit, Way::negative_limit}) {
     SCOPED_TRACE(int(way));
@@ -175,11 +171,7 @@ TEST(StepFailure, OfALawBetweenRigidThings_EndsTheStepAndKeepsTheState) {
   const dfm_world w = test::make_world(h.c);
   test::add_plane(w, "floor");
   test::create(w, {test::box("crate", {0.1, 0.1, 0.1}, 1, {0, 0, 0.1})}, {});
-  dfm_friction_def f{};
-  f.size = sizeof f;
-  f.between[0] = f.between[1] = "*";
-  f.law = "test.bad_law";
-  test::ok(dfm_world_add_friction(w, &f));
+  test::ok(test::add_friction(w, "test.bad_law"));
   test::run(w, 0.05, 1e-3);
   for (const Way way : {Way::throws, Way::fails, Way::nan_force, Way::nan_limit, Way::negative_limit}) {
     SCOPED_TRACE(int(way));
@@ -238,11 +230,7 @@ TEST(StepFailure, RoundingModeLeftByAPlugin_ChangesNoBit) {
   for (const bool rounds : {false, true}) {
     Host h;
     const test::Stack s = test::make_stack(h.c);
-    dfm_friction_def f{};
-    f.size = sizeof f;
-    f.between[0] = f.between[1] = "*";
-    f.law = "test.bad_law";
-    test::ok(dfm_world_add_friction(s.world, &f));
+    test::ok(test::add_friction(s.world, "test.bad_law"));
     test::BodyOptions o;
     o.name = "cloud";
     o.model = "test.bad_model";

@@ -36,8 +36,8 @@ struct Stepper : ModelInstance {
   std::vector<double> u_s, p_s, x_end, v_end;  // f: external forces
 
   Stepper(Host &h, const dfm_type &type, const Mesh &m, const Params &p = {},
-          const std::vector<uint8_t> &fixed = {})
-      : ModelInstance(h, type, m, row_of(type, p), 4, {}, fixed) {
+          const std::vector<uint8_t> &fixed = {}, bool blended = false)
+      : ModelInstance(h, type, m, row_of(type, p), 4, {}, fixed, blended) {
     if (status != DFM_OK) return;
     ext = static_cast<const dfm_stepper *>(ops->extension(self, "dfm.stepper/1"));
     for (std::vector<double> *a : {&u_s, &p_s}) a->assign(3 * size_t(m.npoint()), 0.0);
@@ -55,6 +55,12 @@ struct Stepper : ModelInstance {
     const dfm_kin k = now();
     ASSERT_EQ(ext->predict(self, &k, f, u_s.data()), DFM_OK) << host.logged;
   }
+  std::vector<double> respond(const std::vector<uint32_t> &surfels, const std::vector<double> &p) {
+    std::vector<double> du(3 * surfels.size());
+    const dfm_kin k = now();
+    EXPECT_EQ(ext->respond(self, &k, uint32_t(surfels.size()), surfels.data(), p.data(), du.data()), DFM_OK);
+    return du;
+  }
   void commit() {
     const dfm_kin k = now();
     ASSERT_EQ(ext->commit(self, &k, p_s.data(), x_end.data(), v_end.data()), DFM_OK);
@@ -65,6 +71,11 @@ struct Stepper : ModelInstance {
     std::copy(x_end.begin(), x_end.end(), x);
     std::copy(v_end.begin(), v_end.end(), v);
     state.swap(state_out);
+    t += dt;
+  }
+  void advance(double h) {
+    dt = h;
+    step();
   }
   Vec momentum() const {
     Vec sum{};

@@ -287,10 +287,7 @@ struct Block {
     test::run(world, 0.5, 1e-3);
   }
   std::vector<double> points() const {
-    uint32_t n = 0;
-    test::ok(dfm_body_get_state(body, 0, nullptr, nullptr, &n));
-    std::vector<double> x(size_t(3) * n);
-    test::ok(dfm_body_get_state(body, n, x.data(), nullptr, &n));
+    const std::vector<double> x = test::State(body).x;
     return x;
   }
 };

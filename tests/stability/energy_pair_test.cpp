@@ -253,16 +253,7 @@ struct Bench {
   }
 };
 
-void set_law(dfm_world w, int way) {
-  const double value = way;
-  const dfm_param_value params{"way", &value, 1};
-  dfm_friction_def f{};
-  f.size = sizeof f;
-  f.between[0] = f.between[1] = "*";
-  f.law = kLaw;
-  f.params = {sizeof(dfm_params), 1, &params};
-  test::ok(dfm_world_add_friction(w, &f));
-}
+void set_law(dfm_world w, int way) { test::ok(test::add_friction(w, kLaw, {{"way", way}})); }
 
 constexpr int32_t kIntegrators[] = {DFM_INTEGRATOR_SYMPLECTIC_EULER, DFM_INTEGRATOR_IMPLICIT_EULER};
 

@@ -276,10 +276,8 @@ TEST(EnergyWatch, BodyThatIsPressedAndAtRest_NeedsFewChecks) {
   test::BodyOptions o;
   o.model = "test.counting_looks";
   const dfm_body b = test::make_body(context, w, "beam", {0.1, 0.1, 0.1}, 60, o);
-  uint32_t n = 0;
-  test::ok(dfm_body_get_state(b, 0, nullptr, nullptr, &n));
-  std::vector<double> x(3 * size_t(n));
-  test::ok(dfm_body_get_state(b, n, x.data(), nullptr, &n));
+  const std::vector<double> x = test::State(b).x;
+  const uint32_t n = uint32_t(x.size() / 3);
   std::vector<uint32_t> low;
   for (uint32_t i = 0; i < n; ++i)
     if (x[3 * i + 2] < 1e-6) low.push_back(i);
@@ -304,10 +302,8 @@ void do_work(int32_t integrator, double h) {
     test::BodyOptions o;
     o.position = {0, 0, what == 4 ? 0.05 : 0};
     const dfm_body b = test::make_body(context, w, "beam", {0.3, 0.06, 0.06}, 150, o);
-    uint32_t n = 0;
-    test::ok(dfm_body_get_state(b, 0, nullptr, nullptr, &n));
-    std::vector<double> x(3 * size_t(n));
-    test::ok(dfm_body_get_state(b, n, x.data(), nullptr, &n));
+    const std::vector<double> x = test::State(b).x;
+    const uint32_t n = uint32_t(x.size() / 3);
     std::vector<uint32_t> end;
     for (uint32_t i = 0; i < n; ++i)
       if (x[3 * i] < *std::min_element(x.begin(), x.end()) + 0.02) end.push_back(i);
@@ -443,10 +439,8 @@ TEST(ShortStep, BelowTheFloor_IsRefusedWithASentence) {
   }
   EXPECT_EQ(dfm_world_hash(w), hash);
   EXPECT_EQ(dfm_world_step(w, 1e-9, nullptr), DFM_OK);
-  uint32_t n = 0;
-  test::ok(dfm_body_get_state(b, 0, nullptr, nullptr, &n));
-  std::vector<double> x(3 * size_t(n));
-  test::ok(dfm_body_get_state(b, n, x.data(), nullptr, &n));
+  std::vector<double> x = test::State(b).x;
+  const uint32_t n = uint32_t(x.size() / 3);
   for (size_t i = 0; i < x.size(); i += 3) x[i] += 50;
   test::ok(dfm_body_set_state(b, n, x.data(), nullptr));
   EXPECT_EQ(dfm_world_step(w, 1e-8, nullptr), DFM_E_ARG) << "50 m away positions round 50 times as much";

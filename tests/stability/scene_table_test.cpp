@@ -94,15 +94,20 @@ TEST(SceneTable, EveryShippedScene_HasItsRow) {
 // below the table's.
 TEST(SceneTable, EveryContactScene_IsRunTenTimesWithJitter) {
   std::map<std::string, std::set<int>> seeds;
-  const std::regex call(R"re(expect_jittered\("(\w+)", (\d+), (\d+))re");
+  const std::regex call(R"re(expect_jittered\("(\w+)", (\d+), (\d+),[^;]*?,\s+(\d+|row_of\())re");
   for (const auto &file :
        std::filesystem::directory_iterator(std::string(DEFORM_SOURCE_DIR) + "/tests/stability")) {
     std::ifstream in(file.path());
     std::stringstream text;
     text << in.rdbuf();
     const std::string source = text.str();
-    for (std::sregex_iterator it(source.begin(), source.end(), call), end; it != end; ++it)
-      for (int seed = std::stoi((*it)[2]); seed <= std::stoi((*it)[3]); ++seed) seeds[(*it)[1]].insert(seed);
+    for (std::sregex_iterator it(source.begin(), source.end(), call), end; it != end; ++it) {
+      const std::string scene = (*it)[1], least = (*it)[4];
+      for (int seed = std::stoi((*it)[2]); seed <= std::stoi((*it)[3]); ++seed) seeds[scene].insert(seed);
+      if (std::isdigit(least[0])) {
+        EXPECT_GE(std::stod(least), row_of(scene).least_contacts) << scene;
+      }
+    }
   }
   for (const Row &row : kRows)
     if (row.least_contacts > 0) {

@@ -32,28 +32,14 @@ struct Result {
 
 inline void set_law(dfm_world w, const std::string &law) {
   const double weight = kMass * kG;
-  const double mu_c = 1 / weight;
-  const double mu_s = 1.5 / weight;
-  const double v_s = 1e-3;
-  const double delta = 2;
-  const double sigma0 = 1e5 / kArea;
-  const double sigma1 = std::sqrt(1e5) / kArea;
-  const double sigma2 = 0.4 / kArea;
-  const double kappa = 0.7;
-  const double constant = 1;
-  std::vector<dfm_param_value> v{{"mu_C", &mu_c, 1}};
+  LawValues v{{"mu_C", 1 / weight}};
   if (law != "dahl")
-    v.insert(v.end(), {{"mu_S", &mu_s, 1}, {"v_s", &v_s, 1}, {"delta", &delta, 1}, {"sigma2", &sigma2, 1}});
-  if (law != "coulomb") v.push_back({"sigma0", &sigma0, 1});
+    v.insert(v.end(), {{"mu_S", 1.5 / weight}, {"v_s", 1e-3}, {"delta", 2}, {"sigma2", 0.4 / kArea}});
+  if (law != "coulomb") v.push_back({"sigma0", 1e5 / kArea});
   if (law == "lugre" || law == "elastoplastic")
-    v.insert(v.end(), {{"sigma1", &sigma1, 1}, {"sigma1_form", &constant, 1}});
-  if (law == "elastoplastic") v.push_back({"kappa", &kappa, 1});
-  dfm_friction_def f{};
-  f.size = sizeof f;
-  f.between[0] = f.between[1] = "*";
-  f.law = law.c_str();
-  f.params = {sizeof(dfm_params), uint32_t(v.size()), v.data()};
-  ok(dfm_world_add_friction(w, &f));
+    v.insert(v.end(), {{"sigma1", std::sqrt(1e5) / kArea}, {"sigma1_form", 1}});
+  if (law == "elastoplastic") v.push_back({"kappa", 0.7});
+  ok(add_friction(w, law.c_str(), v));
 }
 
 // The times at which the spring's force rises through the middle of its range tell the period.

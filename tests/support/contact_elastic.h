@@ -254,10 +254,8 @@ struct Pressed {
   struct Frame { double height, shift, turn; };  // of the middle, m; rotation about y
   Frame frame() const { return frame(body, cells); }
   Frame frame(dfm_body of, const Cells &at_rest) const {
-    uint32_t n = 0;
-    ok(dfm_body_get_state(of, 0, nullptr, nullptr, &n));
-    std::vector<double> x(3 * n);
-    ok(dfm_body_get_state(of, n, x.data(), nullptr, &n));
+    const std::vector<double> x = State(of).x;
+    const uint32_t n = uint32_t(x.size() / 3);
     double w = 0, mean[3] = {}, u[3] = {};
     const auto inside = [&](uint32_t i) {
       const double *const p = at_rest.point(i);

@@ -23,10 +23,8 @@ struct Friction {
 
 // Along x, to all points.
 inline void add_speed(dfm_body body, double speed) {
-  uint32_t n = 0;
-  ok(dfm_body_get_state(body, 0, nullptr, nullptr, &n));
-  std::vector<double> x(3 * n), v(3 * n);
-  ok(dfm_body_get_state(body, n, x.data(), v.data(), &n));
+  auto [x, v] = State(body);
+  const uint32_t n = uint32_t(x.size() / 3);
   for (uint32_t i = 0; i < n; ++i) v[3 * i] += speed;
   ok(dfm_body_set_state(body, n, x.data(), v.data()));
 }
@@ -59,15 +57,11 @@ struct Block {
     d.velocity_surface[0] = belt;
     dfm_obstacle floor = 0;
     ok(dfm_obstacle_create(world, &d, &floor));
-    const double v_s = 1e-9, delta = 2;  // from rest to kinetic friction at once
-    const dfm_param_value values[] = {
-        {"mu_C", &f.mu_c, 1}, {"mu_S", &f.mu_s, 1}, {"v_s", &v_s, 1}, {"delta", &delta, 1}, {"dv", &f.dv, 1}};
-    dfm_friction_def def{};
-    def.size = sizeof def;
-    def.between[0] = def.between[1] = "*";
-    def.law = f.law;
-    def.params = {sizeof(dfm_params), f.mu_c == f.mu_s ? 2u : f.dv > 0 ? 5u : 4u, values};
-    ok(dfm_world_add_friction(world, &def));
+    LawValues values = {{"mu_C", f.mu_c}, {"mu_S", f.mu_s}};
+    if (f.mu_c != f.mu_s)  // from rest to kinetic friction at once
+      values.insert(values.end(), {{"v_s", 1e-9}, {"delta", 2}});
+    if (f.mu_c != f.mu_s && f.dv > 0) values.push_back({"dv", f.dv});
+    ok(add_friction(world, f.law, values));
     mark();
   }
   ~Block() { dfm_world_destroy(world); }
@@ -119,10 +113,8 @@ struct Oblique { double t, across, down, v_across, v_down; };
 inline std::vector<Oblique> oblique(double theta_deg, double mu, double v0,
                                     const std::vector<double> &times) {
   Block b({mu, mu}, tilted(theta_deg), {});
-  uint32_t n = 0;
-  ok(dfm_body_get_state(b.body, 0, nullptr, nullptr, &n));
-  std::vector<double> x(3 * n), v(3 * n);
-  ok(dfm_body_get_state(b.body, n, x.data(), v.data(), &n));
+  auto [x, v] = State(b.body);
+  const uint32_t n = uint32_t(x.size() / 3);
   for (uint32_t i = 0; i < n; ++i) v[3 * i + 1] += v0;
   ok(dfm_body_set_state(b.body, n, x.data(), v.data()));
   std::vector<Oblique> out;

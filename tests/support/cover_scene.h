@@ -222,15 +222,7 @@ class Scene {
   }
   void carry(const char *what) {
     ground = add_plane(world, "ground");
-    const double mu = kFloorMu;
-    const dfm_param_value v{"mu", &mu, 1};
-    dfm_friction_def f{};
-    f.size = sizeof f;
-    f.between[0] = what;
-    f.between[1] = "ground";
-    f.law = "coulomb";
-    f.params = {sizeof(dfm_params), 1, &v};
-    must(dfm_world_add_friction(world, &f));
+    must(add_friction(world, "coulomb", {{"mu", kFloorMu}}, what, "ground"));
   }
   void block_on_slab(const std::string &model) {
     upper = mine("upper", block(), {0, 0, 0.03 + 2 * kDrop}, kSpeed, kTurn);
@@ -261,22 +253,15 @@ class Scene {
     set_law("upper");
   }
   void set_law(const char *partner) {
-    const double mu = kMu, sigma0 = hold::kSigma0, sigma1 = 1e3, rate = 1e7;
     const std::string name = law();
-    std::vector<dfm_param_value> v;
-    if (name != "none") v.push_back({"mu_C", &mu, 1});
-    if (name != "none" && name != "dahl") v.push_back({"mu_S", &mu, 1});
-    if (name == "dahl" || name == "lugre" || name == "elastoplastic") v.push_back({"sigma0", &sigma0, 1});
-    if (name == "lugre" || name == "elastoplastic") v.push_back({"sigma1", &sigma1, 1});
+    LawValues v;
+    if (name != "none") v.push_back({"mu_C", kMu});
+    if (name != "none" && name != "dahl") v.push_back({"mu_S", kMu});
+    if (name == "dahl" || name == "lugre" || name == "elastoplastic") v.push_back({"sigma0", hold::kSigma0});
+    if (name == "lugre" || name == "elastoplastic") v.push_back({"sigma1", 1e3});
     // slipping elements follow the normal force within mu p / C = 20 us (doc/laws/gms.md, limits)
-    if (name == "gms") v.push_back({"C", &rate, 1});
-    dfm_friction_def f{};
-    f.size = sizeof f;
-    f.between[0] = "upper";
-    f.between[1] = partner;
-    f.law = name.c_str();
-    f.params = {sizeof(dfm_params), uint32_t(v.size()), v.data()};
-    must(dfm_world_add_friction(world, &f));
+    if (name == "gms") v.push_back({"C", 1e7});
+    must(add_friction(world, name.c_str(), v, "upper", partner));
   }
 
   Row row_;

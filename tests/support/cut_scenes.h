@@ -31,16 +31,7 @@ inline uint32_t parts(dfm_body b) {
   return i.parts;
 }
 
-struct State {
-  std::vector<double> x, v;
-  explicit State(dfm_body b) {
-    uint32_t n = 0;
-    test::ok(dfm_body_get_state(b, 0, nullptr, nullptr, &n));
-    x.resize(3 * size_t{n});
-    v.resize(3 * size_t{n});
-    test::ok(dfm_body_get_state(b, n, x.data(), v.data(), &n));
-  }
-};
+using test::State;
 
 // Of 40 mm about the origin.
 inline dfm_body cube(dfm_context *c, dfm_world w, const char *model, uint32_t cells = 320) {

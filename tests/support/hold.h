@@ -46,17 +46,11 @@ struct Result {
 inline bool promises_stiction(const std::string &law) { return law != "dahl" && law != "lugre"; }
 
 inline void set_law(dfm_world w, const std::string &law) {
-  const double mu = kMu, sigma0 = kSigma0, sigma1 = 1e3;
-  std::vector<dfm_param_value> v{{"mu_C", &mu, 1}};
-  if (law != "dahl") v.push_back({"mu_S", &mu, 1});
-  if (law == "dahl" || law == "lugre" || law == "elastoplastic") v.push_back({"sigma0", &sigma0, 1});
-  if (law == "lugre" || law == "elastoplastic") v.push_back({"sigma1", &sigma1, 1});
-  dfm_friction_def f{};
-  f.size = sizeof f;
-  f.between[0] = f.between[1] = "*";
-  f.law = law.c_str();
-  f.params = {sizeof(dfm_params), uint32_t(v.size()), v.data()};
-  ok(dfm_world_add_friction(w, &f));
+  LawValues v{{"mu_C", kMu}};
+  if (law != "dahl") v.push_back({"mu_S", kMu});
+  if (law == "dahl" || law == "lugre" || law == "elastoplastic") v.push_back({"sigma0", kSigma0});
+  if (law == "lugre" || law == "elastoplastic") v.push_back({"sigma1", 1e3});
+  ok(add_friction(w, law.c_str(), v));
 }
 
 // Scale from `from` to `to` along a smooth step within [t0, t1].
@@ -162,10 +156,8 @@ struct Scene {
     o.name = "bed";
     o.position = {-0.07, -0.065, -0.03};
     const dfm_body b = make_body(context, world, "beam", {0.14, 0.13, 0.03}, c.fine ? 1000 : 200, o);
-    uint32_t n = 0;
-    ok(dfm_body_get_state(b, 0, nullptr, nullptr, &n));
-    std::vector<double> x(3 * size_t(n));
-    ok(dfm_body_get_state(b, n, x.data(), nullptr, &n));
+    const std::vector<double> x = State(b).x;
+    const uint32_t n = uint32_t(x.size() / 3);
     std::vector<uint32_t> low;
     for (uint32_t i = 0; i < n; ++i)
       if (x[3 * i + 2] < -0.03 + 1e-9) low.push_back(i);
@@ -336,10 +328,8 @@ struct Scene {
   }
   // The far half of a pad slides along x as in a guide; its far face is pressed.
   static void press(dfm_body b, int side, double force) {
-    uint32_t n = 0;
-    ok(dfm_body_get_state(b, 0, nullptr, nullptr, &n));
-    std::vector<double> x(3 * size_t(n)), f;
-    ok(dfm_body_get_state(b, n, x.data(), nullptr, &n));
+    std::vector<double> x = State(b).x, f;
+    const uint32_t n = uint32_t(x.size() / 3);
     double far = 0;
     for (uint32_t i = 0; i < n; ++i) far = std::max(far, side * x[3 * i]);
     std::vector<uint32_t> back, guided;

@@ -11,31 +11,25 @@
 #include <map>
 
 #include "statics.h"
+#include "vec.h"
 
 namespace test {
 
-using Vec = std::array<double, 3>;
 using Counts = std::array<uint32_t, 3>;
 constexpr uint32_t kTet10 = DFM_CELL_TET10, kHex8 = DFM_CELL_HEX8, kHex20 = DFM_CELL_HEX20,
                    kHex27 = DFM_CELL_HEX27;
-struct Cells {
+struct CellKind {
   const char *name;
   size_t nodes;
   int vtk;
 };
-inline const Cells &cells_of(uint32_t kind) {
-  static const std::map<uint32_t, Cells> all = {{kTet10, {"second-order tetrahedra", 10, 24}},
-                                                {kHex8, {"hexahedra", 8, 12}},
-                                                {kHex20, {"hexahedra of 20 points", 20, 25}},
-                                                {kHex27, {"hexahedra of 27 points", 27, 29}}};
+inline const CellKind &cells_of(uint32_t kind) {
+  static const std::map<uint32_t, CellKind> all = {{kTet10, {"second-order tetrahedra", 10, 24}},
+                                                   {kHex8, {"hexahedra", 8, 12}},
+                                                   {kHex20, {"hexahedra of 20 points", 20, 25}},
+                                                   {kHex27, {"hexahedra of 27 points", 27, 29}}};
   return all.at(kind);
 }
-
-inline Vec minus(const Vec &a, const Vec &b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-inline Vec cross(const Vec &a, const Vec &b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-inline double dot(const Vec &a, const Vec &b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 constexpr size_t kTetEdge[6][2] = {{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}};
 // between two corners; a face or the whole between two that are opposite

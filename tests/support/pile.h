@@ -36,15 +36,10 @@ inline void box(dfm_world w) {
 // Friction up to mu 2, and bristles from soft to nearly rigid where the law has them.
 inline void law(dfm_world w, const std::string &name, Random &r) {
   const double mu = r.within(0.1, 2), sigma0 = r.scale(1e6, 1e11);
-  std::vector<dfm_param_value> values;
-  if (name != "none") values.push_back({"mu", &mu, 1});
-  if (name == "dahl" || name == "lugre" || name == "elastoplastic") values.push_back({"sigma0", &sigma0, 1});
-  dfm_friction_def f{};
-  f.size = sizeof f;
-  f.between[0] = f.between[1] = "*";
-  f.law = name.c_str();
-  f.params = {sizeof(dfm_params), uint32_t(values.size()), values.data()};
-  ok(dfm_world_add_friction(w, &f));
+  LawValues values;
+  if (name != "none") values.push_back({"mu", mu});
+  if (name == "dahl" || name == "lugre" || name == "elastoplastic") values.push_back({"sigma0", sigma0});
+  ok(add_friction(w, name.c_str(), values));
 }
 
 inline void bodies(dfm_context *c, dfm_world w, uint32_t n, Random &r) {

@@ -1,15 +1,9 @@
 // Rigid bodies that several tests make through the public API.
 #pragma once
+#include "vec.h"
 #include "world.h"
 
 namespace test {
-
-using Vec = std::array<double, 3>;
-
-inline double dot(Vec a, Vec b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-inline double norm(Vec a) { return std::sqrt(dot(a, a)); }
-inline Vec vec(const double *p) { return {p[0], p[1], p[2]}; }
-inline double apart(Vec a, Vec b) { return norm({a[0] - b[0], a[1] - b[1], a[2] - b[2]}); }
 
 inline dfm_rigid_def box(const char *name, Vec half, double mass, Vec position = {}) {
   dfm_rigid_def d = dfm_rigid_def_default();
@@ -88,15 +82,7 @@ inline void add(Momenta &to, const dfm_body_measure &m) {
 }
 
 // What rigid bodies fall on: a ball of 0.1 m, a bed of 0.3 by 0.3 by 0.1 m with its bottom held.
-inline std::vector<double> points(dfm_body b) {
-  dfm_body_info info{};
-  info.size = sizeof info;
-  ok(dfm_body_get_info(b, &info));
-  std::vector<double> x(3 * info.npoint);
-  uint32_t n = 0;
-  ok(dfm_body_get_state(b, info.npoint, x.data(), nullptr, &n));
-  return x;
-}
+inline std::vector<double> points(dfm_body b) { return State(b).x; }
 inline double lowest(dfm_body b) {
   double low = 1e9;
   const std::vector<double> x = points(b);

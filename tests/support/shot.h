@@ -13,10 +13,6 @@ namespace test {
 
 inline std::array<double, 3> turn(const double q[4], std::array<double, 3> p) {
   const std::array<double, 3> u{q[0], q[1], q[2]};
-  const auto cross = [](std::array<double, 3> a, std::array<double, 3> b) {
-    return std::array<double, 3>{a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2],
-                                 a[0] * b[1] - a[1] * b[0]};
-  };
   const auto t = cross(u, p), s = cross(u, t);
   for (size_t k = 0; k < 3; ++k) p[k] += 2 * q[3] * t[k] + 2 * s[k];
   return p;

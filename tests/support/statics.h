@@ -96,12 +96,7 @@ struct Statics {
     test::ok(dfm_world_equilibrium(world, &def, &info));
     return info;
   }
-  std::vector<double> positions() const {
-    std::vector<double> x(3 * size_t(npoint));
-    uint32_t n = 0;
-    test::ok(dfm_body_get_state(body, npoint, x.data(), nullptr, &n));
-    return x;
-  }
+  std::vector<double> positions() const { return test::State(body).x; }
   std::vector<double> rest() const {
     std::vector<double> x(3 * size_t(npoint));
     test::ok(dfm_body_get_rest(body, npoint, x.data(), 0, nullptr));

@@ -142,10 +142,8 @@ inline Setting make(dfm_context *context, const Case &c) {
   if (hung) d.fixed = fixed.data();
   ok(dfm_body_create(s.world, &d, &s.body));
   ok(dfm_mesh_destroy(mesh));
-  uint32_t n = 0;
-  ok(dfm_body_get_state(s.body, 0, nullptr, nullptr, &n));
-  std::vector<double> x(3 * size_t(n));
-  ok(dfm_body_get_state(s.body, n, x.data(), nullptr, &n));
+  std::vector<double> x = State(s.body).x;
+  const uint32_t n = uint32_t(x.size() / 3);
   const dfm_body_measure m = measure(s.body);
   const double strain = c.motion == "ring" ? 0.01 : c.motion == "wrung" ? 0.05 : 0;
   for (size_t i = 0; i < x.size(); ++i)

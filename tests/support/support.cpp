@@ -61,6 +61,19 @@ CommandResult deform(std::vector<std::string> args) {
   return run(args);
 }
 
+void expect_refused(const CommandResult &result, const std::vector<std::string> &parts,
+                    const std::string &what) {
+  SCOPED_TRACE(what + "\n" + result.err);
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_EQ(result.out, "");
+  EXPECT_EQ(result.err.rfind("deform: ", 0), 0u);
+  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << "one sentence";
+  EXPECT_TRUE(std::all_of(result.err.begin(), result.err.end(),
+                          [](char c) { return c == '\n' || static_cast<unsigned char>(c) >= 0x20; }));
+  for (const std::string &part : parts)
+    EXPECT_NE(result.err.find(part), std::string::npos) << "expected " << part;
+}
+
 std::string reference_dir() { return DEFORM_BINARY_DIR "/test-data/reference"; }
 std::string mesh_dir() { return DEFORM_BINARY_DIR "/test-data/meshes"; }
 

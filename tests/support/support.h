@@ -21,6 +21,12 @@ struct CommandResult {
 CommandResult run(const std::vector<std::string> &argv);
 // The `deform` command of this build.
 CommandResult deform(std::vector<std::string> args);
+// Exit code 2, and one line of print that begins with the program's name and holds all of the parts.
+void expect_refused(const CommandResult &result, const std::vector<std::string> &parts,
+                    const std::string &what = "");
+inline void expect_refused(const std::vector<std::string> &args, const std::vector<std::string> &parts) {
+  expect_refused(deform(args), parts);
+}
 
 // The reference set and the meshes of the tests, which CMake unpacks from tests/data.
 std::string reference_dir();

@@ -5,9 +5,7 @@
 
 namespace test::tools {
 
-inline Vec cross(Vec a, Vec b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
+using test::cross;
 
 inline Vec rotate(const double q[4], Vec v) {
   const Vec u = {q[0], q[1], q[2]}, t = cross(u, v), s = cross(u, t);

@@ -7,14 +7,7 @@ namespace {
 
 void set_bristles(dfm_context *c, dfm_world w, double sigma0, double mu) {
   test::ok(dfm_plugin_register_static(c, dfm_plugin_entry_bristle, "bristle"));
-  const dfm_param_value values[] = {{"mu", &mu, 1}, {"sigma0", &sigma0, 1}};
-  dfm_friction_def f{};
-  f.size = sizeof f;
-  f.between[0] = "block";
-  f.between[1] = "*";
-  f.law = "test.bristle";
-  f.params = {sizeof(dfm_params), 2, values};
-  test::ok(dfm_world_add_friction(w, &f));
+  test::ok(test::add_friction(w, "test.bristle", {{"mu", mu}, {"sigma0", sigma0}}, "block"));
 }
 
 struct TwoPads {

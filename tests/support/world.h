@@ -130,6 +130,19 @@ std::vector<T> listed(dfm_status (*list)(uint64_t, uint32_t, T *, uint32_t *), u
 }
 inline std::vector<dfm_contact> contacts(dfm_world w) { return listed(dfm_world_contacts, w); }
 
+// m and m/s, [npoint,3].
+struct State {
+  std::vector<double> x, v;
+  explicit State(dfm_body b) {
+    uint32_t n = 0;
+    ok(dfm_body_get_state(b, 0, nullptr, nullptr, &n));
+    x.resize(3 * size_t{n});
+    v.resize(3 * size_t{n});
+    ok(dfm_body_get_state(b, n, x.data(), v.data(), &n));
+  }
+  bool operator==(const State &) const = default;
+};
+
 // What one of the functions writes that tell their size first.
 template <class T>
 std::string written(dfm_status (*write)(dfm_world, T *, size_t *), dfm_world w) {
@@ -172,14 +185,17 @@ inline dfm_obstacle add_plane(dfm_world w, const char *name, std::array<double, 
   return o;
 }
 
+using LawValues = std::vector<std::pair<const char *, double>>;
+inline dfm_status add_friction(dfm_world w, const char *law, const LawValues &given = {}, const char *a = "*",
+                               const char *b = "*") {
+  std::vector<dfm_param_value> values;
+  for (const auto &[key, value] : given) values.push_back({key, &value, 1});
+  const dfm_friction_def f = {
+      sizeof f, 0, {a, b}, law, {sizeof(dfm_params), uint32_t(values.size()), values.data()}, 0};
+  return dfm_world_add_friction(w, &f);
+}
 inline void set_friction(dfm_world w, double mu, const char *law = "coulomb") {
-  const dfm_param_value v{"mu", &mu, 1};
-  dfm_friction_def f{};
-  f.size = sizeof f;
-  f.between[0] = f.between[1] = "*";
-  f.law = law;
-  if (std::string(law) != "none") f.params = {sizeof(dfm_params), 1, &v};
-  ok(dfm_world_add_friction(w, &f));
+  ok(add_friction(w, law, std::string(law) == "none" ? LawValues{} : LawValues{{"mu", mu}}));
 }
 
 inline dfm_body_measure measure(dfm_body b) {

@@ -72,14 +72,7 @@ inline dfm_body make_zoned_beam(dfm_context *c, dfm_world w, std::array<double, 
 
 inline dfm_status friction(dfm_world w, const char *a, const char *b, double mu,
                            const char *law = "coulomb") {
-  const dfm_param_value v{"mu", &mu, 1};
-  dfm_friction_def f{};
-  f.size = sizeof f;
-  f.between[0] = a;
-  f.between[1] = b;
-  f.law = law;
-  f.params = {sizeof(dfm_params), 1, &v};
-  return dfm_world_add_friction(w, &f);
+  return add_friction(w, law, {{"mu", mu}}, a, b);
 }
 
 }  // namespace test

@@ -502,7 +502,7 @@ TEST(BroadPhase, Filter_DecidesByMasksAndNamedPairs) {
   EXPECT_EQ(touching(), "01 0p 12 ");
 }
 
-TEST(BroadPhase, RemovedAndChangedBodies_AreForgotten) {
+TEST(BroadPhase, RemovedBodies_AreForgotten) {
   Scene scene;
   for (int i = 0; i < 3; ++i) scene.add(moved(box_mesh({1, 1, 1}, 1, 1, 1), {}, {0, 0, 1.001 * i}));
   BroadPhase broad(Memory::standard());
@@ -511,8 +511,8 @@ TEST(BroadPhase, RemovedAndChangedBodies_AreForgotten) {
   EXPECT_TRUE(broad.update(scene.bodies, scene.obstacles, scene.filter, scene.h, scene.offset));
   EXPECT_TRUE(broad.candidates().empty());
   scene.bodies.clear();
-  EXPECT_TRUE(broad.update(scene.bodies, scene.obstacles, scene.filter, scene.h, scene.offset) ||
-              broad.candidates().empty());
+  broad.update(scene.bodies, scene.obstacles, scene.filter, scene.h, scene.offset);
+  EXPECT_TRUE(broad.candidates().empty());
 }
 
 TEST(BroadPhase, BodyWithNaN_LeavesTheOthersAlone) {

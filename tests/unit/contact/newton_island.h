@@ -7,6 +7,7 @@
 
 #include "contact/newton.h"
 #include "dense.h"
+#include "near.h"
 #include "same_tolerance.h"
 
 namespace test {
@@ -272,14 +273,14 @@ class Island {
     double most = 0;
     for (uint32_t k = 0; k < points_.nsurfel; ++k)
       for (int c = 0; c < 3; ++c)
-        most = std::max(most, std::fabs(velocity(k)[c] - velocity_[4 * size_t{k} + size_t(c)] -
-                                        sum[3 * size_t{k} + size_t(c)] / mass_[k]));
+        most = test::worse(most, std::fabs(velocity(k)[c] - velocity_[4 * size_t{k} + size_t(c)] -
+                                           sum[3 * size_t{k} + size_t(c)] / mass_[k]));
     if (!body || body->found.empty()) return most;
     std::vector<double> r(3 * size_t{body_.nsurfel});
     body->residual(body->found.data(), r.data());
     for (size_t k = 0; k < r.size(); ++k)
-      most = std::max(most, std::fabs(r[k] - sum[3 * size_t{points_.nsurfel} + k]) *
-                                body->diagonal_inverse()[4 * (k / 3) + k % 3]);
+      most = test::worse(most, std::fabs(r[k] - sum[3 * size_t{points_.nsurfel} + k]) *
+                                   body->diagonal_inverse()[4 * (k / 3) + k % 3]);
     return most;
   }
   // Signorini's and Coulomb's conditions of every contact, and those of bonds, within the tolerance; slip may

@@ -124,7 +124,7 @@ TEST(Tasks, JobsOfTwoBlocksOnEightThreads_RunOnTheSameTwo) {
 }
 
 // More threads than processors are of no use, and would wake and sleep in each job.
-TEST(Tasks, JobsOnMoreThreadsThanProcessors_UseAsManyAsProcessors) {
+TEST(Tasks, JobsOfTooManyThreads_UseAsManyAsProcessors) {
   const uint32_t processors = std::thread::hardware_concurrency();
   if (!processors) GTEST_SKIP() << "the number of processors is not known";
   Tasks tasks(processors + 6, nullptr, nullptr);

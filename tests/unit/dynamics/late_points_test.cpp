@@ -40,12 +40,7 @@ struct Probed {
   ~Probed() { dfm_scene_close(scene); }
   dfm::Body &inside() const { return *test::inside(world).bodies[0]; }
 
-  struct State { std::vector<double> x, v; };
-  State state() const {
-    State s{std::vector<double>(3 * inside().p.n), std::vector<double>(3 * inside().p.n)};
-    test::ok(dfm_body_get_state(body, inside().p.n, s.x.data(), s.v.data(), nullptr));
-    return s;
-  }
+  test::State state() const { return test::State(body); }
   // An impact without a force: the points lead in the next step.
   void touch() const {
     const double point[3] = {}, none[3] = {};

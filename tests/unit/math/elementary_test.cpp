@@ -8,6 +8,7 @@
 #include <random>
 
 #include "core/hash.h"
+#include "near.h"
 
 namespace {
 
@@ -25,7 +26,7 @@ double worst(F &&ours, G &&exact, Draw &&draw, int n) {
     const auto x = draw();
     const long double e = exact(x);
     if (!std::isfinite(static_cast<double>(e))) continue;
-    most = std::max(most, static_cast<double>(std::fabs(ours(x) - e) / ulp(e)));
+    most = test::worse(most, static_cast<double>(std::fabs(ours(x) - e) / ulp(e)));
   }
   return most;
 }

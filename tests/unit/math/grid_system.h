@@ -10,6 +10,7 @@
 #include "dense.h"
 #include "math/block_matrix.h"
 #include "math/ldlt_solver.h"
+#include "near.h"
 
 namespace test {
 
@@ -90,7 +91,7 @@ inline std::vector<double> noise(size_t n, uint32_t seed) {
 inline double worst(const std::vector<double> &a, const std::vector<double> &b) {
   double difference = 0, size = 0;
   for (size_t k = 0; k < a.size(); ++k) {
-    difference = std::max(difference, std::fabs(a[k] - b[k]));
+    difference = worse(difference, std::fabs(a[k] - b[k]));
     size = std::max(size, std::fabs(b[k]));
   }
   return difference / size;

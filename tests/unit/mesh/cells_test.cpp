@@ -14,13 +14,7 @@ namespace {
 
 using namespace dfm;
 
-void expect_refusal(const std::string &text, dfm_status status, const std::vector<std::string> &words) {
-  const auto error = test::refusal_of_text("a.msh", text);
-  ASSERT_TRUE(error) << "it was read";
-  EXPECT_EQ(error->status, status) << error->sentence;
-  for (const std::string &word : words)
-    EXPECT_NE(error->sentence.find(word), std::string::npos) << "no '" << word << "' in: " << error->sentence;
-}
+using test::expect_refusal;
 
 const Memory &kMemory = Memory::standard();
 
@@ -285,11 +279,13 @@ TEST(SecondOrder, TrianglesThatAreNoFaces_StayWhole) {
 
 TEST(CellFiles, WhatIsNoBody_IsRefused) {
   expect_refusal(
+      "a.msh",
       kMsh22 + kTen + "$Elements\n2\n1 11 2 0 1 1 2 3 4 5 6 7 8 9 10\n2 4 2 0 1 1 2 3 4\n$EndElements\n",
       DFM_E_UNSUPPORTED, {"tetrahedra beside second-order tetrahedra", "one kind"});
-  expect_refusal(kMsh22 + kTen + "$Elements\n1\n1 11 2 0 1 1 2 3 4 6 5 7 8 9 10\n$EndElements\n",
+  expect_refusal("a.msh", kMsh22 + kTen + "$Elements\n1\n1 11 2 0 1 1 2 3 4 6 5 7 8 9 10\n$EndElements\n",
                  DFM_E_FORMAT, {"cell 0", "distorted", "order its points"});
   expect_refusal(
+      "a.msh",
       kMsh22 + kTen +
           "$Elements\n2\n1 11 2 0 1 1 2 3 4 5 6 7 8 9 10\n2 11 2 0 1 1 2 3 4 5 6 7 8 9 10\n$EndElements\n",
       DFM_E_FORMAT, {"on one another"});

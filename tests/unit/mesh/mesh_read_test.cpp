@@ -26,14 +26,7 @@ RestMesh read_text(const std::string &name, const std::string &text) {
   return read_mesh(Memory::standard(), path, DFM_MESH_CELLS);
 }
 
-void expect_refusal(const std::string &name, const std::string &text, dfm_status status,
-                    const std::vector<std::string> &words) {
-  const auto error = test::refusal_of_text(name, text);
-  ASSERT_TRUE(error) << name << " was read";
-  EXPECT_EQ(error->status, status) << error->sentence;
-  for (const std::string &word : words)
-    EXPECT_NE(error->sentence.find(word), std::string::npos) << "no '" << word << "' in: " << error->sentence;
-}
+using test::expect_refusal;
 
 using Corner = std::array<double, 3>;
 

@@ -1,5 +1,7 @@
 // What the mesh tests share: memory that counts and refuses, files by folder, the sentence of a refusal.
 #pragma once
+#include <gtest/gtest.h>
+
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
@@ -55,20 +57,39 @@ inline std::vector<std::string> own_surfaces() {
                   {".obj", ".ply", ".stl", ".off", ".vtk", ".vtp", ".mesh", ".msh"});
 }
 
-// The error of reading a file; none where it is read.
-inline std::optional<dfm::Error> refusal(const std::string &path,
-                                         const dfm::Memory &memory = dfm::Memory::standard()) {
+// The error of reading; none where it is read.
+template <class Read>
+std::optional<dfm::Error> error_of(Read read) {
   try {
-    dfm::read_mesh(memory, path, DFM_MESH_CELLS);
+    read();
   } catch (const dfm::Error &e) {
     return e;
   }
   return std::nullopt;
 }
+inline std::optional<dfm::Error> refusal(const std::string &path,
+                                         const dfm::Memory &memory = dfm::Memory::standard()) {
+  return error_of([&] { dfm::read_mesh(memory, path, DFM_MESH_CELLS); });
+}
 inline std::optional<dfm::Error> refusal_of_text(const std::string &name, const std::string &text) {
   const std::string path = scratch("mesh") + "/" + name;
   write_file(path, text);
   return refusal(path);
+}
+
+// Its sentence begins so, and holds all of the words.
+inline void expect_error(const std::optional<dfm::Error> &error, dfm_status status,
+                         const std::vector<std::string> &words, const std::string &begin = "") {
+  ASSERT_TRUE(error) << "it was read" << (words.empty() ? "" : ", in spite of " + words[0]);
+  EXPECT_EQ(error->status, status) << error->sentence;
+  EXPECT_EQ(error->sentence.rfind(begin, 0), 0u) << error->sentence;
+  for (const std::string &word : words)
+    EXPECT_NE(error->sentence.find(word), std::string::npos) << "no '" << word << "' in: " << error->sentence;
+}
+inline void expect_refusal(const std::string &name, const std::string &text, dfm_status status,
+                           const std::vector<std::string> &words) {
+  SCOPED_TRACE(name + ":\n" + text.substr(0, 200));
+  expect_error(refusal_of_text(name, text), status, words);
 }
 
 // The first 20 points of each cell, and no others.

@@ -115,14 +115,7 @@ const MeshGroup &group_of(const RestMesh &mesh, const std::string &name, int32_t
   return mesh.groups.at(0);
 }
 
-void expect_refusal(const std::string &name, const std::string &text, dfm_status status,
-                    const std::vector<std::string> &words) {
-  const auto error = test::refusal_of_text(name, text);
-  ASSERT_TRUE(error) << "it was read:\n" << text;
-  EXPECT_EQ(error->status, status) << error->sentence;
-  for (const std::string &word : words)
-    EXPECT_NE(error->sentence.find(word), std::string::npos) << "no '" << word << "' in: " << error->sentence;
-}
+using test::expect_refusal;
 
 class MeshesOfEngineers : public testing::TestWithParam<uint32_t> {};
 INSTANTIATE_TEST_SUITE_P(Kinds, MeshesOfEngineers,

@@ -17,15 +17,7 @@ RawMesh parse(const std::string &name, const std::string &text) {
 
 void expect_unsupported(const std::string &name, const std::string &text,
                         const std::vector<std::string> &words) {
-  try {
-    parse(name, text);
-    ADD_FAILURE() << name << " was read";
-  } catch (const Error &e) {
-    EXPECT_EQ(e.status, DFM_E_UNSUPPORTED) << e.sentence;
-    EXPECT_EQ(e.sentence.rfind(name + ": ", 0), 0u) << e.sentence;
-    for (const std::string &word : words)
-      EXPECT_NE(e.sentence.find(word), std::string::npos) << "no '" << word << "' in: " << e.sentence;
-  }
+  test::expect_error(test::error_of([&] { parse(name, text); }), DFM_E_UNSUPPORTED, words, name + ": ");
 }
 
 }  // namespace

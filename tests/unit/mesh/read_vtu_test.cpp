@@ -39,15 +39,7 @@ const std::string kFour = "0 0 0 1 0 0 0 1 0 0 0 1";
 std::string one_tet() { return piece(4, kFour, 1, "0 1 2 3", "4", "10"); }
 
 void expect_refusal(const std::string &text, dfm_status status, const std::vector<std::string> &words) {
-  try {
-    parse(text);
-    ADD_FAILURE() << "was read: " << text;
-  } catch (const Error &e) {
-    EXPECT_EQ(e.status, status) << e.sentence;
-    EXPECT_EQ(e.sentence.rfind("a.vtu", 0), 0u) << e.sentence;
-    for (const std::string &word : words)
-      EXPECT_NE(e.sentence.find(word), std::string::npos) << "no '" << word << "' in: " << e.sentence;
-  }
+  test::expect_error(test::error_of([&] { parse(text); }), status, words, "a.vtu");
 }
 
 std::string base64(const std::string &bytes) {

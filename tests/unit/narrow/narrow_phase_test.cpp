@@ -744,7 +744,7 @@ TEST(FindContacts, BlocksOnSeveralThreads_GiveTheBitsOfOne) {
   }
 }
 
-TEST(FindContacts, BlockWithoutMemory_ThrowsInTheCaller) {
+TEST(FindContacts, BlockWithoutMemoryOnTwoThreads_ThrowsInTheCaller) {
   Scene scene;
   const Mesh cylinder = cylinder_mesh(0.2, 1, 48, 40);
   scene.add(cylinder);

@@ -44,14 +44,7 @@ struct Running {
     test::ok(dfm_world_set_friction(stack.world, a, b, &params));
   }
   void add_friction(double mu, const char *a, const char *b, const char *law = "coulomb") const {
-    const dfm_param_value v{"mu", &mu, 1};
-    dfm_friction_def f{};
-    f.size = sizeof f;
-    f.between[0] = a;
-    f.between[1] = b;
-    f.law = law;
-    f.params = {sizeof(dfm_params), 1, &v};
-    test::ok(dfm_world_add_friction(stack.world, &f));
+    test::ok(test::add_friction(stack.world, law, {{"mu", mu}}, a, b));
   }
   uint32_t push(double force, uint32_t nkey = 0, const dfm_scale_key *keys = nullptr) const {
     const uint32_t point = 1;
