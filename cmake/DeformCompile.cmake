@@ -117,8 +117,8 @@ function(deform_kernel_flags)
   endforeach()
 endfunction()
 
-# The reader of scenes and the command compute little: without the optimizer's dear passes they are compiled in
-# half the time.
+# The reader of scenes and the command compute little: without the dear passes of the optimizer they are
+# compiled in half the time.
 function(deform_computes_little target)
   target_compile_options(${target} PRIVATE
     $<$<AND:$<CONFIG:Release>,$<CXX_COMPILER_ID:GNU>>:-Og> $<$<BOOL:${DEFORM_SANITIZE}>:-O0>)
