@@ -49,10 +49,11 @@ class File:
         self.internal = set(re.findall(r"^\s*#\s*define (\w+)", text, re.M))
         # other names in a header, or symbols by their names: inline functions of that name may be emitted
         self.renames = bool(re.search(r"^#\s*define.*^#include|\basm\(", text, re.M | re.S))
-        self.opens = bool(re.search(r"^using namespace", text, re.M))
+        self.opens = set(re.findall(r"^using namespace ([\w:]+);", text, re.M))
         self.allocates = bool(re.search(r"^\w.*\boperator (new|delete)\b", text, re.M))
         self.names = set()
-        spaces = []   # of the namespaces that are open: has it a name?
+        self.own_space = {}   # by namespace: the names that this file declares in it
+        spaces = []   # the namespaces that are open here
         for line in path.read_text().splitlines():
             if space := re.match(r"(?:inline )?namespace\s*([\w:]*)\s*\{", line):
                 spaces.append(space.group(1))
@@ -60,7 +61,9 @@ class File:
                 del spaces[-1:]
             elif re.match(r"[A-Za-z_\[]", line):
                 own = not all(spaces) or line.startswith(("static ", "TEST", "using "))
-                (self.internal if own else self.names).update(declared(line))
+                found = declared(line)
+                (self.internal if own else self.names).update(found)
+                self.own_space.setdefault("::".join(spaces), set()).update(found)
         if path.stem.endswith("_test"):   # a program of its own elsewhere
             self.internal |= self.names
 
@@ -78,6 +81,15 @@ class File:
             if path not in found:
                 found.add(path)
                 rest += read(path).includes
+        return found
+
+    @functools.cached_property
+    def by_space(self):
+        """By namespace: the names that headers of ours declare here."""
+        found = {}
+        for path in self.headers:
+            for space, names in read(path).own_space.items():
+                found.setdefault(space, set()).update(names)
         return found
 
     @functools.cached_property
@@ -102,8 +114,21 @@ def hides(one, other):
     return bool(doubtful & other.words) or any(doubtful & read(path).words for path in later)
 
 
+def ambiguous(one, other):
+    """Whether a name that either of them uses is in two of the namespaces that they open."""
+    if one.opens == other.opens:
+        return False
+    found = {}   # by name: a namespace
+    for space in one.opens | other.opens:
+        names = one.by_space.get(space, set()) | other.by_space.get(space, set())
+        for name in names & (one.words | other.words):
+            if found.setdefault(name, space) != space:
+                return True
+    return False
+
+
 def apart(one, other):
-    return (one.alone or other.alone or bool(one.internal & other.internal)
+    return (one.alone or other.alone or bool(one.internal & other.internal) or ambiguous(one, other)
             or hides(one, other) or hides(other, one))
 
 
