@@ -34,13 +34,15 @@ Study two_choices(double reference_error) {
   return study;
 }
 
+std::string picked(const Study &study) { return pick_text(Subject{}, study); }
+
 bool has(const std::string &text, const std::string &part) { return text.find(part) != std::string::npos; }
 
 }  // namespace
 
 // The front shows it as within the target, so the reader asks why it is not chosen.
 TEST(CostWords, CheaperChoiceThatTheReferenceCannotProve_IsNamedWithItsReason) {
-  const std::string said = pick_text(two_choices(0.04));
+  const std::string said = picked(two_choices(0.04));
   EXPECT_TRUE(has(said, "cheapest within 5.00 %: cells x2")) << said;
   EXPECT_TRUE(
       has(said, "cheaper, but proven only to 7.00 % with the reference's own error of 4.00 %: long steps"))
@@ -49,7 +51,7 @@ TEST(CostWords, CheaperChoiceThatTheReferenceCannotProve_IsNamedWithItsReason) {
 }
 
 TEST(CostWords, CheapestChoiceThatIsProven_HasNoOtherBesideIt) {
-  const std::string said = pick_text(two_choices(0.01));
+  const std::string said = picked(two_choices(0.01));
   EXPECT_TRUE(has(said, "cheapest within 5.00 %: long steps")) << said;
   EXPECT_FALSE(has(said, "proven only")) << said;
 }
@@ -58,7 +60,7 @@ TEST(CostWords, CheapestChoiceThatIsProven_HasNoOtherBesideIt) {
 // --apply say the same.
 TEST(CostWords, ChoiceThatNothingBounds_IsLikelyAndNotApplied) {
   Study study = two_choices(0.01);
-  EXPECT_FALSE(has(pick_text(study), "not proven")) << pick_text(study);
+  EXPECT_FALSE(has(picked(study), "not proven")) << picked(study);
   EXPECT_EQ(refusal_to_apply(study), "");
   study.headline = {"force"};
   study.limits["force"].basis = Basis::no_order;
@@ -67,7 +69,7 @@ TEST(CostWords, ChoiceThatNothingBounds_IsLikelyAndNotApplied) {
   study.proven = false;
   const std::string doubt =
       "the meshes show no order, so the reference's own error of 1.00 % may be larger (at most 30.0 %)";
-  EXPECT_TRUE(has(pick_text(study), "likely, not proven: " + doubt)) << pick_text(study);
+  EXPECT_TRUE(has(picked(study), "likely, not proven: " + doubt)) << picked(study);
   const std::string refusal = refusal_to_apply(study);
   EXPECT_TRUE(has(refusal, "\"long steps\" is likely, not proven (" + doubt + "), so nothing is applied"))
       << refusal;
