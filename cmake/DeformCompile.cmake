@@ -120,8 +120,11 @@ endfunction()
 # The reader of scenes and the command compute little: without the dear passes of the optimizer they are
 # compiled in half the time.
 function(deform_computes_little target)
-  target_compile_options(${target} PRIVATE
-    $<$<AND:$<CONFIG:Release>,$<CXX_COMPILER_ID:GNU>>:-Og> $<$<BOOL:${DEFORM_SANITIZE}>:-O0>)
+  if(DEFORM_SANITIZE)
+    target_compile_options(${target} PRIVATE -O0)
+  else()
+    target_compile_options(${target} PRIVATE $<$<AND:$<CONFIG:Release>,$<CXX_COMPILER_ID:GNU>>:-Og>)
+  endif()
 endfunction()
 
 # The standard library's headers, parsed once per target: a third of what a file costs to compile. Builds by

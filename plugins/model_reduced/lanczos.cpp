@@ -120,7 +120,7 @@ class Krylov {
       }
     orthonormalize();
   }
-  // The pairs of the block before the last: values rising; how far they are from true ones is what goes over
+  // The pairs of the block before the last, values falling; how far they are from true ones is what goes over
   // to the last block.
   bool converged(size_t count) {
     const Eigen::Index m = Eigen::Index(width() - kLanes);

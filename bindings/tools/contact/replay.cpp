@@ -4,8 +4,8 @@
 #include <memory>
 
 #include "body/phyxels.h"
-#include "contact/row_law.h"
 #include "contact/newton.h"
+#include "contact/row_law.h"
 #include "core/error.h"
 #include "friction/laws.h"
 #include "math/ldlt_solver.h"

@@ -18,7 +18,7 @@ struct RigidMotion {
   }
 };
 
-// place(i), velocity(i): m, m/s of point i; n > 0. Points on a line have no spin about it.
+// place(i), velocity(i): m, m/s of point i; n > 0.
 template <class Place, class Velocity>
 RigidMotion rigid_motion(uint32_t n, const double *mass, const Place &place, const Velocity &velocity) {
   double all = 0;
@@ -44,9 +44,18 @@ RigidMotion rigid_motion(uint32_t n, const double *mass, const Place &place, con
     s[5] -= mass[i] * r.x * r.y;
   }
   out.mass = all;
+  const double mean = (s[0] + s[1] + s[2]) / 3;
+  if (!(mean > 0)) return out;
+  // Points are on a line where the determinant is below this part of the cube of the mean: a spin about it
+  // moves nothing, and the inverse is that of an inertia about it of this part of the mean.
+  constexpr double kOnALine = 1e-9;
+  const auto det_of = [&] {
+    return dot(Vec3{s[0], s[5], s[4]}, cross(Vec3{s[5], s[1], s[3]}, Vec3{s[4], s[3], s[2]}));
+  };
+  if (!(det_of() > kOnALine * mean * mean * mean))
+    for (int k = 0; k < 3; ++k) s[k] += kOnALine * mean;
   const Vec3 a{s[0], s[5], s[4]}, c{s[5], s[1], s[3]}, e{s[4], s[3], s[2]};
-  const double det = dot(a, cross(c, e));
-  if (!(det > 0)) return out;
+  const double det = det_of();
   const Vec3 ce = cross(c, e), ea = cross(e, a), ac = cross(a, c);
   out.spin = (1 / det) * (momentum.x * ce + momentum.y * ea + momentum.z * ac);
   out.turns[0] = (1 / det) * ce;

@@ -3,8 +3,8 @@
 #include <cmath>
 
 #include "body/phyxels.h"
-#include "contact/row_law.h"
 #include "contact/newton.h"
+#include "contact/row_law.h"
 #include "contact/solve_settings.h"
 #include "core/lists.h"
 

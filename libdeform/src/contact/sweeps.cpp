@@ -38,7 +38,27 @@ class ResidualSchedule {
 
 }  // namespace
 
-Sweeps::Sweeps(const Memory &memory) : anderson_(memory) { use_memory(memory, start_, from_, to_, jump_); }
+AcceleratedImpulses::AcceleratedImpulses(const Memory &memory) : anderson_(memory) {
+  use_memory(memory, from_, to_, jump_);
+}
+
+void AcceleratedImpulses::start(const ContactRows &rows, const RowsPart &part) {
+  constexpr double kGrowth = 4;  // |f| has doubled: contacts have opened or begun to slip
+  jump_.clear();
+  each_row(part, [&](uint32_t i) { jump_.insert(jump_.end(), {rows.wn[i], rows.wt[i], rows.wt[i]}); });
+  anderson_.start(jump_, kGrowth);
+  from_.resize(jump_.size());
+  to_.resize(jump_.size());
+  take_impulses(rows, part, from_.data());
+}
+
+void AcceleratedImpulses::follow(ContactRows &rows, const RowsPart &part) {
+  take_impulses(rows, part, to_.data());
+  if (anderson_.next(from_.data(), to_.data(), jump_.data())) leap(rows, part, jump_.data());
+  take_impulses(rows, part, from_.data());
+}
+
+Sweeps::Sweeps(const Memory &memory) : acceleration_(memory), start_(memory) {}
 
 bool Sweeps::good(const Residual &left, double fraction) const {
   return left.relative <= fraction || (left.required <= fraction && count_ >= Set::inner);
@@ -51,25 +71,9 @@ void Sweeps::sweep_once() {
   ++count_;
 }
 
-void Sweeps::begin_acceleration() {
-  jump_.clear();
-  each_row(*part_,
-           [&](uint32_t i) { jump_.insert(jump_.end(), {rows_->wn[i], rows_->wt[i], rows_->wt[i]}); });
-  anderson_.start(jump_, 4);  // contacts have opened or begun to slip
-  from_.resize(jump_.size());
-  to_.resize(jump_.size());
-  take_impulses(*rows_, *part_, from_.data());
-}
-
-void Sweeps::accelerate() {
-  take_impulses(*rows_, *part_, to_.data());
-  if (anderson_.next(from_.data(), to_.data(), jump_.data())) leap(*rows_, *part_, jump_.data());
-  take_impulses(*rows_, *part_, from_.data());
-}
-
 // With the laws as they were last evaluated. False: not finite.
 bool Sweeps::pass() {
-  begin_acceleration();
+  acceleration_.start(*rows_, *part_);
   for (ResidualSchedule schedule;;) {
     sweep_once();
     if (schedule.is_time(*part_, count_, most_)) {
@@ -78,7 +82,7 @@ bool Sweeps::pass() {
       if (good(left, Set::accuracy) || count_ >= most_ || !laws_->goes_on()) return true;
       schedule.note(count_, left);
     }
-    accelerate();
+    acceleration_.follow(*rows_, *part_);
   }
 }
 

@@ -7,15 +7,27 @@
 
 namespace dfm {
 
+// Anderson acceleration of sweeps over a part of the rows: of its impulses, in the metric of the operator's
+// diagonal.
+class AcceleratedImpulses {
+ public:
+  explicit AcceleratedImpulses(const Memory &memory);
+  void start(const ContactRows &rows, const RowsPart &part);  // before the first sweep
+  void follow(ContactRows &rows, const RowsPart &part);       // after a sweep that another one follows
+
+ private:
+  Anderson anderson_;
+  Array<double> from_, to_, jump_;  // [rows,3], of the part one after the other
+};
+
 struct SweepLimits {
   uint32_t sweeps, passes;
   double start;  // m/s, the residual at the start
 };
 
 // The sweeps of one part of the rows, with what they keep between solves. Where contacts are nearly redundant
-// (vertex-face beside edge-edge, two bodies' grids on each other) a sweep converges slowly; Anderson
-// acceleration, in the metric of the operator's diagonal, helps. The state that is used is always one that a
-// plain sweep has left.
+// (vertex-face beside edge-edge, two bodies' grids on each other) a sweep converges slowly, and acceleration
+// helps. The state that is used is always one that a plain sweep has left.
 class Sweeps {
  public:
   explicit Sweeps(const Memory &memory);
@@ -34,12 +46,9 @@ class Sweeps {
   const Tolerance *tolerance_ = nullptr;
   double h_ = 0;
   uint32_t count_ = 0, most_ = 0;
-  Anderson anderson_;
-  // [rows,3] impulses, of the part one after the other: of the start; of the last sweep
-  Array<double> start_, from_, to_, jump_;
+  AcceleratedImpulses acceleration_;
+  Array<double> start_;  // [rows,3] impulses of the part at the start
 
-  void begin_acceleration();  // before the first sweep of a pass
-  void accelerate();          // after a sweep that another one follows
   void sweep_once();
   bool pass();
   bool good(const Residual &left, double fraction) const;

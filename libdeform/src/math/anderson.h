@@ -13,8 +13,8 @@ namespace dfm {
 class Anderson {
  public:
   explicit Anderson(const Memory &memory);
-  // weights: of the norm of f. growth: of its square, from which on f is of another map, for which earlier
-  // iterates say nothing.
+  // weights: of the norm of f. Where its square grows by more than `growth`, the map has changed, and earlier
+  // iterates are dropped.
   void start(std::span<const double> weights, double growth = HUGE_VAL);
   // g: G(x). jump (output, may be x): from g to the next iterate. False: that is g.
   bool next(const double *x, const double *g, double *jump);

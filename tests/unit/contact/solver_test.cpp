@@ -6,7 +6,7 @@
 
 #include <cmath>
 
-#include "math/anderson.h"
+#include "contact/sweeps.h"
 #include "near.h"
 #include "rows_case.h"
 #include "same_tolerance.h"
@@ -106,15 +106,11 @@ struct Problem : RowsCase {
   void pass(uint32_t sweeps) {
     request();
     const RowsPart part = rows.whole();
-    std::vector<double> weights, from(3 * rows.n), to(3 * rows.n), jump(3 * rows.n);
-    for (uint32_t i = 0; i < rows.n; ++i) weights.insert(weights.end(), {rows.wn[i], rows.wt[i], rows.wt[i]});
-    Anderson anderson{Memory::standard()};
-    anderson.start(weights);
+    AcceleratedImpulses acceleration{Memory::standard()};
+    acceleration.start(rows, part);
     for (uint32_t k = 0; k < sweeps; ++k) {
-      take_impulses(rows, part, from.data());
+      if (k > 0) acceleration.follow(rows, part);
       sweep(rows, part, state, kStep);
-      take_impulses(rows, part, to.data());
-      if (k + 1 < sweeps && anderson.next(from.data(), to.data(), jump.data())) leap(rows, part, jump.data());
     }
   }
   Vec3 impulse(uint32_t i) const { return load3(&rows.impulse[3 * size_t{i}]); }
