@@ -206,12 +206,12 @@ class Serve(unittest.TestCase):
         x = 0.05
         self.viewer.connection.send({"do": "cut", "blade": [x, -1, -1, x, -1, 1, x, 1, 1, x, 1, -1]})
         self.go(lambda: len(self.body.triangles) > before or len(self.world.bodies) > 1)
-        self.go(lambda: all(b.missing == 0 for b in self.viewer.scene.bodies.values())
+        self.go(lambda: all(b.missing == 0 for b in list(self.viewer.scene.bodies.values()))
                 and len(self.viewer.scene.present) == len(self.world.bodies) + 1)
 
     def things(self, viewer):
         scene = viewer.scene
-        return {thing.name for number, thing in scene.things.items() if number in scene.present}
+        return {thing.name for number, thing in list(scene.things.items()) if number in scene.present}
 
     def test_what_is_added_later_is_seen(self):
         self.go(lambda: self.things(self.viewer) == {"floor"})
@@ -226,7 +226,7 @@ class Serve(unittest.TestCase):
         self.addCleanup(late.close)
         for viewer in (self.viewer, late):
             self.go(lambda viewer=viewer: self.things(viewer) == {"floor", "box"}
-                    and [b.name for b in viewer.scene.bodies.values() if not b.missing]
+                    and [b.name for b in list(viewer.scene.bodies.values()) if not b.missing]
                     == ["block", "second"])
 
     def test_what_is_malformed_is_told(self):
