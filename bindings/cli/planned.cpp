@@ -52,7 +52,8 @@ void print_planned(const std::string &json) {
   if (way) {
     print_way(*way, nearest(plan) ? "  nearest:  " : "  chosen:   ");
     if (const std::string missed = plan.get("missed"); !missed.empty())
-      std::printf("  missed:   %s; deform cost measures what each costs\n", missed.c_str());
+      std::printf("  %s %s; deform cost measures what each costs\n",
+                  nearest(plan) ? "missed:  " : "unknown: ", missed.c_str());
     for (const JsonValue &b : way->list("bodies"))
       std::printf("  %-20s  %s: error of the model %s, of time %s, of the mesh %s\n", b.get("name").c_str(),
                   b.get("model").c_str(), percent(b, "model_error").c_str(), percent(b, "time_error").c_str(),

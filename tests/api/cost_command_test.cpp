@@ -376,6 +376,10 @@ TEST(Cost, QuantityThatIsZero_IsLeftOutOrRefused) {
   EXPECT_EQ(none.result.exit_code, 2);
   EXPECT_NE(none.result.err.find("work.slick/floor is 0 in the reference"), std::string::npos)
       << none.result.err;
+  const size_t others = none.result.err.find("; name one of ");
+  ASSERT_NE(others, std::string::npos) << none.result.err;
+  EXPECT_NE(none.result.err.find("work.rough/floor", others), std::string::npos) << none.result.err;
+  EXPECT_EQ(none.result.err.find("work.slick/floor", others), std::string::npos) << none.result.err;
 }
 
 // A model of somebody else, whose dampers push instead of braking, is a choice like all that are loaded.

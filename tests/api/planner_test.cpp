@@ -406,7 +406,7 @@ TEST_F(PlannerScene, HoldsAndObstacles_CountAsTheyAre) {
   EXPECT_TRUE(has(comes, "and speed 0.981 m/s")) << comes;
 }
 
-// Of what the prediction leaves out nothing is claimed: neither that the target is met, nor that it is not.
+// Where the prediction leaves something out, it is not claimed that the target is met.
 TEST_F(PlannerScene, WhatIsLeftOut_IsNotClaimed) {
   const std::string scene = bar(R"("accuracy": {"target": 0.9},)", R"("lattice": null, )");
   const std::string fix = R"(/bodies/0/fix=[{"box": [[-1, -1, -1], [1e-6, 1, 1]])";
@@ -420,6 +420,8 @@ TEST_F(PlannerScene, WhatIsLeftOut_IsNotClaimed) {
           "sine": {"amplitude": 1, "frequency": 3}}])",
        "resonance with a force that oscillates"},
       {R"(/bodies/0/start={"scramble": 1})", "a start in another shape"},
+      {R"(/contact={"self": true})", "contact with itself"},
+      {R"(/contact={"self": "auto"})", "contact with itself"},
       {R"(/tools=[{"name": "t", "shape": "sphere", "radius": 0.01, "pose": {"position": [0, 0, 1]}}])",
        "the motion of tools without keyframes"},
   };
@@ -437,7 +439,7 @@ TEST_F(PlannerScene, WhatIsLeftOut_IsNotClaimed) {
       << run.err;
   EXPECT_FALSE(has(run.out, "nearest")) << run.out;
   const test::CommandResult reported = test::deform({"explain", scene, "--set", kCases[0][0]});
-  EXPECT_TRUE(has(reported.out, "  chosen:   ") && has(reported.out, "  missed:   whether")) << reported.out;
+  EXPECT_TRUE(has(reported.out, "  chosen:   ") && has(reported.out, "  unknown:  whether")) << reported.out;
 }
 
 // The planner looks at a mesh, too; a host hears of it once.
@@ -456,6 +458,28 @@ TEST_F(PlannerScene, Warnings_AreHeardOnce) {
     size_t times = 0;
     for (size_t at = 0; (at = context.log.find(warning, at)) != std::string::npos; ++at) ++times;
     EXPECT_EQ(times, 1u) << context.log;
+  }
+}
+
+// Of a body that then has a lattice, it is not told how its surface would be filled.
+TEST_F(PlannerScene, Warnings_AreOfWhatIsBuilt) {
+  std::string box;
+  for (int i = 0; i < 8; ++i)
+    box += std::string("v ") + (i & 1 ? "0.4 " : "0 ") + (i & 2 ? "0.1 " : "0 ") + (i & 4 ? "0.1\n" : "0\n");
+  for (const char *side : {"1 3 4 2", "5 6 8 7", "1 2 6 5", "3 7 8 4", "1 5 7 3", "2 4 8 6"})
+    box += std::string("f ") + side + "\n";
+  test::write_file(folder() + "/box.obj", box);
+  const std::string path = folder() + "/scene.json";
+  for (const bool kept : {false, true}) {
+    test::write_file(path, R"({"format": "deform-scene", "version": 1, "accuracy": {"target": 0.05},
+ "time": {"duration": 0.1}, "gravity": [0, 0, -9.81], "bodies": [{"name": "bar", "mesh": "box.obj", )" +
+                               std::string(kept ? R"("lattice": null, )" : "") +
+                               R"("fix": [{"box": [[-1, -1, -1], [1e-6, 1, 1]]}]}]})");
+    test::LoggedContext context;
+    dfm_world world = 0;
+    ASSERT_EQ(dfm_scene_load(context.context, path.c_str(), &world), DFM_OK) << dfm_last_error();
+    EXPECT_EQ(has(context.log, "it is filled with"), kept) << context.log;
+    dfm_world_destroy(world);
   }
 }
 

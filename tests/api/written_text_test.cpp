@@ -43,7 +43,7 @@ dfm_status write(dfm_world world, const std::string &path) {
 
 }  // namespace
 
-// A program that shows numbers with a decimal comma reads and writes the same files.
+// A program that shows numbers with a decimal comma reads and writes the same files and sentences.
 TEST(WrittenText, Locale_HasNoInfluence) {
   const std::string source = folder() + "/source";
   test::write_file(source,
@@ -53,20 +53,37 @@ TEST(WrittenText, Locale_HasNoInfluence) {
   const int made = std::system(make.c_str());
   const test::Context context;
   const dfm_world world = world_of(context, "b", R"("model": {"type": "msm"})");
-  const auto texts = [&](const std::string &name) {
-    const std::string under = folder() + "/" + name;
-    std::filesystem::create_directories(under);
+  const std::string under = folder() + "/again", large = under + "/large.json";
+  std::filesystem::create_directories(under);
+  test::write_file(large, R"({"format": "deform-scene", "version": 1, "time": {"duration": 1.5e400}})");
+  const auto texts = [&] {
     test::ok(write(world, under + "/made.json"));
-    return plan_of(world) + test::read_file(under + "/made.json") +
-           test::read_file(under + "/made_files/b_start.csv");
+    std::string out = plan_of(world) + test::read_file(under + "/made.json") +
+                      test::read_file(under + "/made_files/b_start.csv");
+    dfm_world back = 0, none = 0;
+    EXPECT_EQ(dfm_scene_load(context, (under + "/made.json").c_str(), &back), DFM_OK) << dfm_last_error();
+    out += plan_of(back);
+    EXPECT_EQ(dfm_scene_load(context, large.c_str(), &none), DFM_E_FORMAT);
+    out += dfm_last_error();
+    dfm_obstacle floor = 0;
+    test::ok(dfm_world_find_obstacle(back, "floor", &floor));
+    const dfm_pose far = {{0, 0, -1e5}, {0, 0, 0, 1}};
+    test::ok(dfm_obstacle_move_to(floor, &far));
+    EXPECT_EQ(dfm_world_step(back, 1e-3, nullptr), DFM_E_ARG);
+    out += dfm_last_error();
+    dfm_world_destroy(back);
+    return out;
   };
-  const std::string here = texts("a");
+  const std::string here = texts();
   setenv("LOCPATH", folder().c_str(), 1);
   const char *const set = std::setlocale(LC_NUMERIC, "xx_XX");
-  const std::string there = texts("b");
-  std::setlocale(LC_NUMERIC, "C");
   unsetenv("LOCPATH");
-  EXPECT_TRUE(here == there) << (set ? set : "no locale with a comma could be made") << made << there;
+  ASSERT_NE(set, nullptr) << "localedef has made no locale with a comma: " << made;
+  const std::string there = texts();
+  std::setlocale(LC_NUMERIC, "C");
+  EXPECT_TRUE(here == there) << there;
+  for (const char *sentence : {"the number 1.5e400 is too large", "in a step of 0.001 s"})
+    EXPECT_NE(here.find(sentence), std::string::npos) << here;
 }
 
 // Names of a host that are not UTF-8, which JSON has to be.
@@ -81,6 +98,16 @@ TEST(WrittenText, NameInAnotherEncoding_IsRefusedInAScene) {
   EXPECT_EQ(write(world, folder() + "/odd.json"), DFM_E_ARG);
   test::says({"'K?rper' cannot be used in a scene: a name has 1 to 100 bytes of UTF-8"});
   EXPECT_NE(plan_of(world).find("{\"name\":\"K?rper\""), std::string::npos) << plan_of(world);
+  // longer than it need be, half of a pair of UTF-16, beyond U+10FFFF
+  for (const char *bytes : {"\xe0\x80\x80", "\xed\xa0\x80", "\xf0\x80\x80\x80", "\xf4\x90\x80\x80"}) {
+    dfm_world other = 0;
+    test::ok(dfm_world_create(context, &plain, &other));
+    const test::Tet tet(bytes);
+    test::ok(dfm_body_create(other, &tet.def, &body));
+    EXPECT_EQ(write(other, folder() + "/odd.json"), DFM_E_ARG);
+    test::says({"cannot be used in a scene"});
+    EXPECT_NE(plan_of(other).find("{\"name\":\"??"), std::string::npos) << plan_of(other);
+  }
 
   // so for the group of a surface that a rule names
   test::write_file(folder() + "/odd.msh",
@@ -98,7 +125,11 @@ TEST(WrittenText, NameInAnotherEncoding_IsRefusedInAScene) {
   rule.law = "coulomb";
   test::ok(dfm_world_add_friction(grouped, &rule));
   EXPECT_EQ(write(grouped, folder() + "/again.json"), DFM_E_ARG);
-  test::says({"a group of a surface has a name that is not UTF-8"});
+  test::says({"the name of this file, or of a group of a surface, is not UTF-8"});
+  // and for the file, whose folder is named within it
+  const dfm_world fine = world_of(context, "b", R"("model": {"type": "msm"})");
+  EXPECT_EQ(write(fine, folder() + "/gr\xfcn.json"), DFM_E_ARG);
+  test::says({"the name of this file, or of a group of a surface, is not UTF-8"});
 }
 
 // What the library chooses for one model of a rule is no matter of the one that is in use.

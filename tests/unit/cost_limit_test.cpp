@@ -178,7 +178,7 @@ TEST(CostQuantities, ProbeThatACutTakes_IsComparedUntilThen) {
     for (int i = 0; i <= 10; ++i) {
       const double t = 0.1 * i;
       const std::string x = i <= last ? std::to_string(t + off) + ",0,0,1,0,0" : "nan,nan,nan,nan,nan,nan";
-      probes << t << ",tip," << x << "\n";
+      probes << t << ",tip," << x << "\n" << t << ",com.b," << x << "\n" << t << ",com.left," << x << "\n";
       bodies << t << ",b,0,0,0,0,0,0,0,0,1\n";
     }
     return to.string();
@@ -188,5 +188,9 @@ TEST(CostQuantities, ProbeThatACutTakes_IsComparedUntilThen) {
   const Quantity &of = truth.at("tip");
   EXPECT_DOUBLE_EQ(of.t.back(), 0.6);
   EXPECT_NEAR(error_of(other.at("tip"), of, 1), 0.02, 1e-6);
+  // a probe is known by its name, unless the center of a body is
+  EXPECT_EQ(truth.at("com.b").family, "com");
+  EXPECT_EQ(truth.at("probe.com.b").values, of.values);
+  EXPECT_EQ(truth.at("com.left").values, of.values);
   EXPECT_NEAR(error_of(of, other.at("tip"), 1), 0.02, 1e-6) << "the later records of the other side";
 }

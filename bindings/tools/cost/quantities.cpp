@@ -5,7 +5,6 @@
 #include <cstdlib>
 #include <filesystem>
 #include <limits>
-#include <set>
 
 #include "file.h"
 
@@ -50,14 +49,14 @@ Quantity &of(Quantities &all, const std::string &name, const char *family, const
   return q;
 }
 
+// After the others: a probe may have the name of one of them.
 void read_probes(const Table &probes, Quantities &out) {
-  static const std::set<std::string> families = {"com",   "force", "work", "volume",  "energy",
-                                                 "touch", "slip",  "rest", "liftoff", "probe"};
   for (const Row &row : probes.rows) {
     const std::string &name = probes.text(row, "probe");
     if (!std::isfinite(probes.number(row, "x"))) continue;  // a cut has taken its cell
-    Quantity &q =
-        of(out, families.count(name.substr(0, name.find('.'))) ? "probe." + name : name, "probe", "m", 3);
+    const auto same = out.find(name);
+    const bool taken = same != out.end() && same->second.family != "probe";
+    Quantity &q = of(out, taken ? "probe." + name : name, "probe", "m", 3);
     q.t.push_back(probes.number(row, "t"));
     for (const char *c : {"x", "y", "z"}) q.values.push_back(probes.number(row, c));
     for (const char *c : {"vx", "vy", "vz"}) q.rates.push_back(probes.number(row, c));
@@ -144,13 +143,13 @@ void read_contacts(const Table &contacts, const std::vector<double> &times, Quan
 Quantities read_quantities(const std::string &folder) {
   Quantities out;
   const Table bodies = read_table(folder + "/bodies.csv");
-  read_probes(read_table(folder + "/probes.csv"), out);
   read_bodies(bodies, out);
   add_rests(bodies, out);
   std::vector<double> times;
   for (const Row &row : bodies.rows)
     if (const double t = bodies.number(row, "t"); times.empty() || t > times.back()) times.push_back(t);
   if (!times.empty()) read_contacts(read_table(folder + "/contacts.csv"), times, out);
+  read_probes(read_table(folder + "/probes.csv"), out);
   return out;
 }
 

@@ -439,24 +439,30 @@ class Student {
     own.own = own.error[size_t(own.check)];
   }
 
+  // Quantities of at least this scale.
+  std::string listed(double least) const {
+    std::string all;
+    for (const std::string &name : out_.quantities)
+      if (out_.scales.at(name) >= least) all += (all.empty() ? "" : ", ") + name;
+    return all;
+  }
+
   void name_headline(const Quantities &truth) {
     std::vector<std::string> words = out_.options.quantities;
     if (words.empty()) words = {"probe"};
     for (const std::string &word : words) {
       const std::vector<std::string> names = named(truth, word);
       if (names.empty()) {
-        std::string all;
-        for (const std::string &name : out_.quantities) all += (all.empty() ? "" : ", ") + name;
         throw Failure(kBadInput, "--quantity: there is no \"" + word + "\" in this scene, expected one of " +
-                                     all + did_you_mean(word, out_.quantities));
+                                     listed(0) + did_you_mean(word, out_.quantities));
       }
       for (const std::string &name : names)
         (out_.scales.at(name) > 0 ? out_.headline : out_.zeros).push_back(name);
     }
     if (out_.headline.empty())
-      throw Failure(kBadInput,
-                    "--quantity: " + out_.zeros[0] +
-                        " is 0 in the reference, and no error is relative to that; name another one");
+      throw Failure(kBadInput, "--quantity: " + out_.zeros[0] +
+                                   " is 0 in the reference, and no error is relative to that; name one of " +
+                                   listed(std::numeric_limits<double>::min()));
   }
 
   // Of a row against another, by quantity.

@@ -41,7 +41,11 @@ size_t character(const unsigned char *s) {
                                                  : 0;
   for (size_t i = 1; i < n; ++i)
     if ((s[i] & 0xc0) != 0x80) return 0;  // also ends at the terminating zero
-  return n;
+  // longer than it need be, half of a pair of UTF-16, beyond U+10FFFF
+  const unsigned first = n > 1 ? unsigned{s[0]} << 8 | s[1] : 0;
+  const bool invalid = (first >= 0xe000 && first < 0xe0a0) || (first >= 0xeda0 && first < 0xee00) ||
+                       (first >= 0xf000 && first < 0xf090) || first >= 0xf490;
+  return invalid ? 0 : n;
 }
 
 size_t edit_distance(const std::string &a, const std::string &b) {

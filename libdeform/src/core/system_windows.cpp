@@ -11,6 +11,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <memory>
+#include <string_view>
 #include <system_error>
 
 #include "core/path.h"
@@ -105,6 +106,9 @@ std::optional<std::string> environment(const char *name) {
 std::optional<std::string> trusted_environment(const char *name) { return environment(name); }
 
 int print(char *text, size_t capacity, const char *format, va_list args) {
+  // switching the locale takes much longer than the text
+  if (localeconv()->decimal_point == std::string_view("."))
+    return std::vsnprintf(text, capacity, format, args);
   const int mode = _configthreadlocale(_ENABLE_PER_THREAD_LOCALE);
   char before[128];
   std::snprintf(before, sizeof before, "%s", setlocale(LC_NUMERIC, nullptr));

@@ -289,7 +289,7 @@ class Builder {
   }
 
   void create_body(Body &b) {
-    BodyMesh mesh = files_.load(b);
+    BodyMesh mesh = files_.load(b, true);
     const std::vector<dfm_material> materials = materials_by_group(b, mesh);
     mesh.cell_weight = cell_weights(mesh, materials);
     std::vector<NodalRow> nodal;
@@ -303,13 +303,7 @@ class Builder {
           def_.with_pointer(f.pointer, [&] { return read_field(files_.path_of(f.path), f, mesh); }));
       fields.push_back({f.key.c_str(), values.back().data(), f.width});
     }
-    std::vector<uint8_t> fixed(mesh.info.npoint, 0);
-    std::vector<std::vector<uint32_t>> held;
-    for (const Fix &f : b.fixes) {
-      held.push_back(select(f.where, mesh, def_.file));
-      for (uint32_t p : held.back()) fixed[p] |= f.axes;
-    }
-    for (const NodalRow &row : nodal) fixed[row.point] |= row.axes;
+    const std::vector<uint8_t> fixed = held_axes(b, mesh, nodal, def_.file);
 
     dfm_body_def &d = b.def;
     d.name = b.name.c_str();
@@ -348,7 +342,7 @@ class Builder {
       def_.require(
           dfm_body_set_state(body, mesh.info.npoint, start_positions(b.start, mesh, d.pose).data(), nullptr),
           b.start.pointer);
-    for (size_t i = 0; i < b.fixes.size(); ++i) move_held(body, b.fixes[i], held[i]);
+    for (const Fix &f : b.fixes) move_held(body, f, mesh);
     add_loads(body, b, mesh, nodal);
     for (const Spring &s : b.springs) add_spring(body, s, b.name, mesh);
     if (b.start.kind == StartKind::state) set_state(body, b, mesh);
@@ -468,8 +462,9 @@ class Builder {
     return (steps - 1) * step + 2e-6 * step;
   }
 
-  void move_held(dfm_body body, const Fix &f, const std::vector<uint32_t> &points) const {
+  void move_held(dfm_body body, const Fix &f, const BodyMesh &mesh) const {
     if (!f.motion.any()) return;
+    const std::vector<uint32_t> points = select(f.where, mesh, def_.file);
     def_.require(dfm_body_move_held(body, uint32_t(points.size()), points.data(),
                                     uint32_t(f.motion.keys.size()), f.motion.keys.data(), &f.motion.sine),
                  f.where.pointer + "/motion");

@@ -228,8 +228,8 @@ void MeshFiles::split_skin(BodyMesh &out) {
   if (skin.triangle_group) skin.triangle_group = kept.group.data();
 }
 
-BodyMesh MeshFiles::load(const Body &b) {
-  const bool made = !b.made.kind.empty(), anew = b.fill || b.lattice(), warn = told_.insert(b.name).second;
+BodyMesh MeshFiles::load(const Body &b, bool warn) {
+  const bool made = !b.made.kind.empty(), anew = b.fill || b.lattice();
   const std::string path = !made  ? path_of(b.mesh)
                            : anew ? make_surface(b)
                                   : make(b),

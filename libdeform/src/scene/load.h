@@ -23,8 +23,8 @@ class MeshFiles {
   MeshFiles(const MeshFiles &) = delete;
 
   std::string path_of(const std::string &path) const;  // relative to the scene file
-  // Cells, surface and groups of a body, scaled. Borrows from this object. The first call for a body warns.
-  BodyMesh load(const Body &body);
+  // Cells, surface and groups of a body, scaled. Borrows from this object. `warn`: of what a world then has.
+  BodyMesh load(const Body &body, bool warn = false);
   const dfm_type &model(const Body &body);  // that it names, or that of its cells
   // Triangles of an obstacle of shape mesh or voxels into its def. `points` takes those that are scaled; the
   // rest is borrowed from this object.
@@ -59,7 +59,6 @@ class MeshFiles {
   const Definition &def_;
   std::set<std::string> surface_only_;
   std::map<std::string, dfm_mesh_handle> meshes_;  // by what is made, and its file or name
-  std::set<std::string> told_;                     // bodies of which was warned
   std::deque<Triangles> split_;                    // by body, lent to its BodyMesh
 };
 

@@ -2,8 +2,6 @@
 // tree can exhaust the stack) and finds duplicate keys, which the parser would silently drop.
 #include <algorithm>
 #include <cctype>
-#include <cmath>
-#include <cstdlib>
 #include <cstring>
 #include <set>
 
@@ -95,7 +93,7 @@ std::pair<size_t, size_t> too_large_number(const std::string &text) {
       i = string_end(text, i);
     } else if (text[i] == '-' || std::isdigit(static_cast<unsigned char>(text[i]))) {
       const size_t end = std::min(text.find_first_not_of("+-.0123456789eE", i), text.size());
-      if (!std::isfinite(std::strtod(text.substr(i, end - i).c_str(), nullptr))) return {i, end};
+      if (!json::accept(text.substr(i, end - i))) return {i, end};
       i = end - 1;
     }
   }

@@ -134,6 +134,15 @@ std::vector<NodalRow> read_nodal(const std::string &path, const BodyMesh &mesh) 
   return rows;
 }
 
+std::vector<uint8_t> held_axes(const Body &body, const BodyMesh &mesh, const std::vector<NodalRow> &nodal,
+                               const std::string &file) {
+  std::vector<uint8_t> axes(mesh.info.npoint);
+  for (const Fix &f : body.fixes)
+    for (const uint32_t p : select(f.where, mesh, file)) axes[p] |= f.axes;
+  for (const NodalRow &row : nodal) axes[row.point] |= row.axes;
+  return axes;
+}
+
 StartState read_start_state(const std::string &path, const BodyMesh &mesh) {
   const std::vector<uint32_t> point_of = points_of_nodes(mesh);
   Table table(path, kStateHeader, point_of.size(), 7);

@@ -17,6 +17,9 @@ struct NodalRow {
   double force[3];
 };
 std::vector<NodalRow> read_nodal(const std::string &path, const BodyMesh &mesh);
+// [npoint] axes along which the body's fixes and its table hold each point.
+std::vector<uint8_t> held_axes(const Body &body, const BodyMesh &mesh, const std::vector<NodalRow> &nodal,
+                               const std::string &file);
 
 inline constexpr const char *kStateHeader = "node,x,y,z,vx,vy,vz";
 // [npoint,3] m and m/s, in the world, from a file that names every node once.

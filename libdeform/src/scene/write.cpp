@@ -172,8 +172,7 @@ void SceneWriter::check_name(const char *kind, const std::string &name) const {
   } catch (const Error &) {
     fail(DFM_E_ARG,
          "%s: the name of %s '%s' cannot be used in a scene: a name has 1 to 100 bytes of UTF-8, does not "
-         "begin "
-         "with a dot, and contains no control characters and none of / \\ , : * = \"; create it under "
+         "begin with a dot, and contains no control characters and none of / \\ , : * = \"; create it under "
          "another name",
          path.c_str(), kind, name.c_str());
   }
@@ -611,7 +610,8 @@ void write_scene(World &w, const std::string &path, const WriteOptions &options,
     print(write_root(to), "", text);
   } catch (const Written::type_error &) {
     fail(DFM_E_ARG,
-         "%s: a group of a surface has a name that is not UTF-8, which a scene must be; rename the group",
+         "%s: the name of this file, or of a group of a surface, is not UTF-8, which a scene must be; rename "
+         "it",
          path.c_str());
   }
   if (notes > 0 && !options.partial) {

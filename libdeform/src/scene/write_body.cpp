@@ -121,7 +121,7 @@ void write_model(SceneWriter &to, const Body &b, Written &out) {
     given.push_back({row.key, &now[at], row.width});
   }
   write_choice(type, given, out["model"]);
-  // A rule that leaves it to the library for one of its models means the body's, and names it for the others.
+  // Where a rule leaves an integrator to the library, so does the body, and the rule names the others.
   const auto open = [](const SwitchRule &r) {
     const auto automatic = [](const ModelChoice &c) {
       return !c.type.empty() && c.integrator == uint32_t{DFM_INTEGRATOR_AUTO};

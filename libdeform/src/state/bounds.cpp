@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
+#include <cstdarg>
 
 #include "core/error.h"
 #include "geometry/obstacle_shape.h"
@@ -35,12 +35,18 @@ double speed_of(const Obstacle &o, const Pose &from, const Pose &to, double seco
          norm(spin_between(from.rotation, to.rotation, seconds)) * turned(o);
 }
 
-void check_speed(const World &w, const Obstacle &o, double speed, const char *when) {
+// `when`: a format, used for what is too fast only, since a step must not allocate.
+DEFORM_PRINTF(4, 5)
+void check_speed(const World &w, const Obstacle &o, double speed, const char *when, ...) {
   if (speed <= speed_limit(w) * (1 + 1e-9)) return;
+  va_list args;
+  va_start(args, when);
+  const std::string text = vformat(when, args);
+  va_end(args);
   fail(DFM_E_ARG,
        "%s '%s' would move at %.4g m/s %s; at most %g m/s (dfm_world_def.obstacle_speed): give it more "
        "time, or put it there without a motion (%s)",
-       o.rigid ? "tool" : "obstacle", o.name.c_str(), speed, when, speed_limit(w),
+       o.rigid ? "tool" : "obstacle", o.name.c_str(), speed, text.c_str(), speed_limit(w),
        o.rigid ? "dfm_tool_teleport" : "dfm_obstacle_teleport");
 }
 
@@ -111,9 +117,7 @@ void check_motion_speed(const World &w, const Obstacle &o) {
 }
 
 void check_way(const World &w, const Obstacle &o, const Pose &from, const Pose &to, double dt) {
-  char when[40];  // not a string: a step must not allocate
-  std::snprintf(when, sizeof when, "in a step of %g s", dt);
-  check_speed(w, o, speed_of(o, from, to, dt), when);
+  check_speed(w, o, speed_of(o, from, to, dt), "in a step of %g s", dt);
 }
 
 void check_target_speeds(const World &w, double dt) {

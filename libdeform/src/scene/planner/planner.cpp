@@ -134,7 +134,7 @@ bool explicit_alone(const Body &b) { return b.device == "gpu" || b.def.mass_scal
 class Reader {
  public:
   Reader(dfm_context *context, const Definition &def, MeshFiles &files)
-      : context_(context), def_(def), types_(context->registry), files_(files) {
+      : context_(context), def_(def), types_(context->registry), files_(files), tried_(context, def) {
     const auto &keys = def.gravity_keys;
     Vec3 most = load3(def.world.gravity);
     for (const double t : turns_of(keys))
@@ -154,7 +154,8 @@ class Reader {
         if (b.nodal_bc.empty()) return {};
         return read_nodal(files_.path_of(b.nodal_bc), meshes_.back());
       }));
-      holds_.push_back(hold_of(b, meshes_.back(), nodal_.back()));
+      const std::vector<uint8_t> axes = held_axes(b, meshes_.back(), nodal_.back(), def_.file);
+      holds_.push_back({std::ssize(axes) - std::ranges::count(axes, 0), std::ranges::count(axes, 7)});
     }
     for (size_t i = 0; i < meshes_.size(); ++i) {
       const Body &b = def_.bodies[i];
@@ -188,8 +189,9 @@ class Reader {
       b.fill.reset();
       b.lattice_size =
           round_to_digits(b.scale * std::cbrt(meshes_[i].info.volume / (times * meshes_[i].info.ntet)));
+      const Quiet quiet;
       try {
-        const BodyMesh mesh = files_.load(b);
+        const BodyMesh mesh = tried_.load(b);
         if (!carries(b, mesh, meshes_[i])) continue;
         // others are not the blocks that are predicted, and large cells would join the sides of a gap
         const auto [found, first] = convex_.try_emplace(i);
@@ -243,7 +245,7 @@ class Reader {
                                 [&](const Body &o) { return std::ranges::any_of(o.attach, to_it); }),
         "what it is attached to");
     add(b.start.kind != StartKind::rest, "a start in another shape");
-    add(def_.world.self_contact == DFM_SELF_ON, "contact with itself");
+    add(def_.world.self_contact != DFM_SELF_OFF, "contact with itself");
     add(std::ranges::any_of(def_.rigid.bodies, [&](const RigidBody &o) { return may_meet(b, o); }),
         "the motion of rigid bodies");
     add(std::ranges::any_of(def_.tools,
@@ -333,11 +335,10 @@ class Reader {
            !own_parts(b.springs) && !own_parts(b.attach);
   }
 
-  const Material &material(const Body &b) const {
+  const Material &material(const Thing &t) const {
     static const Material kNone = {};
-    for (const Material &m : def_.materials)
-      if (m.name == b.material) return m;
-    return kNone;
+    const auto m = std::ranges::find(def_.materials, t.material, &Material::name);
+    return m == def_.materials.end() ? kNone : *m;
   }
 
   static bool moves(const Obstacle &o) { return !o.keys.empty() || o.def.sine.frequency > 0; }
@@ -345,13 +346,6 @@ class Reader {
 
   // Points that are held, and those that are held along all axes.
   struct Hold { ptrdiff_t any = 0, all = 0; };
-  Hold hold_of(const Body &b, const BodyMesh &mesh, const std::vector<NodalRow> &nodal) const {
-    std::vector<uint8_t> axes(mesh.info.npoint);
-    for (const Fix &f : b.fixes)
-      for (const uint32_t p : select(f.where, mesh, def_.file)) axes[p] |= f.axes;
-    for (const NodalRow &row : nodal) axes[row.point] |= row.axes;
-    return {ptrdiff_t(axes.size()) - std::ranges::count(axes, 0), std::ranges::count(axes, 7)};
-  }
   // Whether the attachment holds the body, to an obstacle or to a body that is held; `moving`: to one that
   // moves, too.
   bool holds(const Attach &a, bool moving) const {
@@ -384,10 +378,7 @@ class Reader {
   }
 
   bool may_meet(const Thing &a, const Thing &b) const {
-    const auto side = [&](const Thing &t) {
-      const auto m = std::ranges::find(def_.materials, t.material, &Material::name);
-      return PairSide{t.name, {}, m == def_.materials.end() ? std::string_view() : m->title};
-    };
+    const auto side = [&](const Thing &t) { return PairSide{t.name, {}, material(t).title}; };
     const Filter *const rule = best_rule(def_.filters, side(a), side(b));
     return !a.sensor && !b.sensor && (!rule || rule->collide);
   }
@@ -576,8 +567,9 @@ class Reader {
   const Definition &def_;
   const Registry &types_;
   MeshFiles &files_;
+  MeshFiles tried_;                  // lattices, of which the scene takes at most one for each body
   double g_ = 0, down_[3] = {};      // the greatest gravity in the run
-  std::vector<Obstacle> obstacles_;  // as they begin, then those that tools are
+  std::vector<Obstacle> obstacles_;  // as they begin, those of tools last
   // by body
   std::vector<BodyMesh> meshes_;
   std::vector<std::vector<NodalRow>> nodal_;
