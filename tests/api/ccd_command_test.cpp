@@ -1,7 +1,6 @@
 // `deform ccd` as a user calls it.
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>

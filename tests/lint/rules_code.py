@@ -190,13 +190,14 @@ def kernels(tree):
 
 
 def systems(tree):
-    """In the library and the command, headers that Windows lacks are included in *_posix.cpp alone, and no
-    name is converted by fs::path(name) or path.string(). Not found: implicit conversions, and functions that
+    """In what is built for Windows, headers that it lacks are included in *_posix.cpp alone, and no name is
+    converted by fs::path(name) or path.string(). Not found: implicit conversions, and functions that
     headers of both systems declare differently."""
     alone = re.compile(r"(dlfcn|elf|link|netdb|poll|spawn|arpa/\w+|"
                        r"sys/(file|mman|prctl|resource|socket|syscall|un|wait))\.h$")
     left_out = re.compile(r"_(posix|windows)\.cpp$|bindings/cli/(bullet_host|cmd_study|cmd_worker)\.cpp$")
-    for path in tree.select(SRC, "bindings/cli/"):
+    tools = [f"bindings/tools/{name}/" for name in ("check", "ccd", "rollback")]
+    for path in tree.select(SRC, "bindings/cli/", *tools):
         content = tree.text(path)
         if left_out.search(path) or "__has_include(<link.h>)" in content:
             continue

@@ -170,6 +170,7 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"model_bound_sets_the_step", "V06", "let it only fall"},
         Case{"model_asks_who_it_is", "V07", "in another process"},
         Case{"model_hides_nan", "V08", "finite results"}, Case{"model_leaks", "V09", "on the heap"},
+        Case{"model_releases_twice", "V09", "had released before"},
         Case{"model_rounds_upward", "V11", "add_forces leaves the rounding mode"},
         Case{"model_prints", "V12", "my model 1.0"}, Case{"model_shares_a_static", "V14", "\"shared\""},
         Case{"model_pulls_at_rest", "M01", "the rest pose has forces"},

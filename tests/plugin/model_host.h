@@ -453,9 +453,12 @@ size_t refuse_each_allocation(Make make) {
   size_t calls = 0;
   {
     Host host;
-    const auto body = make(host);
-    EXPECT_EQ(body.status, DFM_OK) << host.logged;
-    calls = host.calls;
+    {
+      const auto body = make(host);
+      EXPECT_EQ(body.status, DFM_OK) << host.logged;
+      calls = host.calls;
+    }
+    EXPECT_EQ(host.live, 0u);
   }
   EXPECT_GT(calls, 0u);
   for (size_t n = 0; n < calls; ++n) {

@@ -32,6 +32,7 @@ def main():
     assert (folder / "out/Szene ä/summary.json").exists()
     deform("run", "Szene ä.json", "--quiet", "--time", "0.01", "--save-scene", "Kopie é.json")
     deform("run", "Kopie é.json", "--quiet", "--time", "0.02")
+    deform("rollback", "Szene ä.json", "--time", "0.01")
     assert "Kugel ñ.vtu" in deform("mesh", "info", "Kugel ñ.vtu")
     assert "fehlt ü.vtu: cannot be opened: No such file" in deform("mesh", "info", "fehlt ü.vtu", code=2)
     for program in ("ccd", "rollback"):

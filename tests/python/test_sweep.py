@@ -468,6 +468,13 @@ class Outputs(InAFolder):
         foreign.write_bytes(b"PAR1" + bytes(3 << 20) + b"deform sweep" + bytes(100))
         refuse_foreign(foreign, "deform sweep")
 
+    def test_windows_is_refused_before_anything_is_made(self):
+        for study in deform.sweep, deform.fit:
+            with (unittest.mock.patch("os.name", "nt"),
+                  self.assertRaisesRegex(deform.UnsupportedError, "need POSIX")):
+                study(self.out / "study.json")
+        self.assertFalse(self.out.exists())
+
     def test_columns_of_one_kind(self):
         self.assertEqual(of_one_kind([1, 0.5, None]), [1, 0.5, None])
         self.assertEqual(of_one_kind(["a", None]), ["a", None])

@@ -4,6 +4,7 @@ from __future__ import annotations
 import json
 import logging
 import os
+import signal
 import subprocess
 import sys
 import tempfile
@@ -20,6 +21,7 @@ def main() -> None:
     # `deform sweep` and `deform fit` come back to this interpreter
     environment = {"DEFORM_PYTHON": sys.executable, **os.environ}
     if os.name == "nt":  # there who has started this process would not wait for the other one
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the command
         sys.exit(subprocess.call([path, *sys.argv[1:]], env=environment))
     os.execve(path, [path, *sys.argv[1:]], environment)
 

@@ -100,7 +100,7 @@ def _path() -> pathlib.Path:
     given = os.environ.get("DEFORM_LIBRARY")
     path = pathlib.Path(given) if given else NATIVE / _LIBRARY
     if not path.exists():
-        raise ImportError(f"{path} is not there: install the package (pip install .), or name a libdeform.so "
+        raise ImportError(f"{path} is not there: install the package (pip install .), or name a {_LIBRARY} "
                           f"in the environment variable DEFORM_LIBRARY")
     return path
 
@@ -199,8 +199,8 @@ def refuse_foreign(path: pathlib.Path, mark: str) -> None:
     except (FileNotFoundError, NotADirectoryError):
         return
     if found and mark.encode() not in found:
-        raise FileError(f"{path}: another program wrote this file, which stays as it is; give another folder "
-                        f"(--out)", "DFM_E_IO")
+        raise FileError(f"{path}: another program wrote this file, or an earlier deform; remove it, or give "
+                        f"another folder (--out)", "DFM_E_IO")
 
 
 def write_whole(path: pathlib.Path, data: bytes, mark: str = "") -> None:

@@ -1,7 +1,10 @@
 #include "check/environment.h"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <cfloat>
+#include <cstdio>
 
 #include "check/check.h"
 
@@ -66,6 +69,37 @@ std::string Process::difference(const Process &later) const {
     return text("changes the mask of new files from %03o to %03o; leave the mask to the program", file_mask_,
                 later.file_mask_);
   return "";
+}
+
+// ---- streams ----------------------------------------------------------------------------------------------
+
+Captured::Captured() {
+  std::fflush(nullptr);
+  for (int k = 0; k < 2; ++k) {
+    saved_[k] = dup(k + 1);
+    memory_[k] = memory_file();
+    dup2(memory_[k], k + 1);
+  }
+}
+
+Captured::~Captured() {
+  std::fflush(nullptr);
+  for (int k = 0; k < 2; ++k) {
+    dup2(saved_[k], k + 1);
+    close(saved_[k]);
+    close(memory_[k]);
+  }
+}
+
+std::string Captured::text(int descriptor) const {
+  std::fflush(nullptr);
+  std::string out(4096, '\0');
+  const int file = memory_[descriptor - 1];  // whose place the stream shares
+  lseek(file, 0, SEEK_SET);
+  const auto n = read(file, out.data(), unsigned(out.size()));
+  lseek(file, 0, SEEK_END);
+  out.resize(n > 0 ? size_t(n) : 0);
+  return out;
 }
 
 }  // namespace cli::check

@@ -51,6 +51,7 @@ class Process {
   unsigned file_mask_ = 0;
 };
 
+int memory_file();  // a descriptor: a file that is gone once it is closed
 // While it lives, what is written to standard output and standard error goes to memory.
 class Captured {
  public:

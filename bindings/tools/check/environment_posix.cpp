@@ -8,7 +8,6 @@
 
 #include <clocale>
 #include <csignal>
-#include <cstdio>
 #include <exception>
 #include <filesystem>
 #include <new>
@@ -64,32 +63,6 @@ int Process::threads() {
   return n;
 }
 
-// ---- streams ----------------------------------------------------------------------------------------------
-
-Captured::Captured() {
-  std::fflush(nullptr);
-  for (int k = 0; k < 2; ++k) {
-    saved_[k] = dup(k + 1);
-    memory_[k] = memfd_create("deform_check", MFD_CLOEXEC);
-    dup2(memory_[k], k + 1);
-  }
-}
-
-Captured::~Captured() {
-  std::fflush(nullptr);
-  for (int k = 0; k < 2; ++k) {
-    dup2(saved_[k], k + 1);
-    close(saved_[k]);
-    close(memory_[k]);
-  }
-}
-
-std::string Captured::text(int descriptor) const {
-  std::fflush(nullptr);
-  std::string out(4096, '\0');
-  const ssize_t n = pread(memory_[descriptor - 1], out.data(), out.size(), 0);
-  out.resize(n > 0 ? static_cast<size_t>(n) : 0);
-  return out;
-}
+int memory_file() { return memfd_create("deform_check", MFD_CLOEXEC); }
 
 }  // namespace cli::check

@@ -10,11 +10,9 @@
 
 #include <clocale>
 #include <csignal>
-#include <cstdio>
 #include <cstdlib>
 #include <exception>
 #include <filesystem>
-#include <new>
 
 #include "system.h"
 
@@ -57,36 +55,11 @@ int Process::threads() {
   return n;
 }
 
-Captured::Captured() {
-  std::fflush(nullptr);
-  for (int k = 0; k < 2; ++k) {
-    wchar_t folder[MAX_PATH], name[MAX_PATH];
-    GetTempPathW(MAX_PATH, folder);
-    GetTempFileNameW(folder, L"dfm", 0, name);
-    saved_[k] = _dup(k + 1);
-    memory_[k] =
-        _wopen(name, _O_RDWR | _O_CREAT | _O_TEMPORARY | _O_BINARY | _O_NOINHERIT, _S_IREAD | _S_IWRITE);
-    _dup2(memory_[k], k + 1);
-  }
-}
-
-Captured::~Captured() {
-  std::fflush(nullptr);
-  for (int k = 0; k < 2; ++k) {
-    _dup2(saved_[k], k + 1);
-    _close(saved_[k]);
-    _close(memory_[k]);
-  }
-}
-
-std::string Captured::text(int descriptor) const {
-  std::fflush(nullptr);
-  std::string out(4096, '\0');
-  _lseek(memory_[descriptor - 1], 0, SEEK_SET);
-  const int n = _read(memory_[descriptor - 1], out.data(), unsigned(out.size()));
-  _lseek(memory_[descriptor - 1], 0, SEEK_END);
-  out.resize(n > 0 ? size_t(n) : 0);
-  return out;
+int memory_file() {
+  wchar_t folder[MAX_PATH], name[MAX_PATH];
+  GetTempPathW(MAX_PATH, folder);
+  GetTempFileNameW(folder, L"dfm", 0, name);
+  return _wopen(name, _O_RDWR | _O_CREAT | _O_TEMPORARY | _O_BINARY | _O_NOINHERIT, _S_IREAD | _S_IWRITE);
 }
 
 }  // namespace cli::check

@@ -7,7 +7,6 @@
 namespace cli::check {
 
 // rules_file.cpp: the file and what it says of itself
-// as its author called it; empty where the file is stripped
 Check exports_one_symbol, refuses_unknown_abi, metadata_complete;
 // Why nothing can use the type, as the sentence of V03: a parameter row that cannot be read, or a function
 // that every use of it calls and that is missing. Empty: none.

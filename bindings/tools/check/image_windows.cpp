@@ -40,11 +40,14 @@ bool image_stays(const std::string &file) {
 
 namespace {
 
+[[noreturn]] void not_pe() {
+  broken("it is not a shared library (PE of 64 bits); build it with deform_add_plugin");
+}
+
 template <class T>
 T part(const std::string &bytes, uint64_t offset) {
   T out{};
-  if (offset > bytes.size() || bytes.size() - offset < sizeof out)
-    broken("it is not a shared library (PE); build it with deform_add_plugin");
+  if (offset > bytes.size() || bytes.size() - offset < sizeof out) not_pe();
   std::memcpy(&out, bytes.data() + offset, sizeof out);
   return out;
 }
@@ -55,7 +58,9 @@ class Mapped {
   explicit Mapped(const std::string &bytes) : bytes_(bytes) {
     const uint64_t at = uint64_t(part<IMAGE_DOS_HEADER>(bytes, 0).e_lfanew);
     header_ = part<IMAGE_NT_HEADERS64>(bytes, at);
-    if (header_.Signature != IMAGE_NT_SIGNATURE) part<char>(bytes, bytes.size());
+    if (header_.Signature != IMAGE_NT_SIGNATURE ||
+        header_.OptionalHeader.Magic != IMAGE_NT_OPTIONAL_HDR64_MAGIC)
+      not_pe();
     const uint64_t sections =
         at + offsetof(IMAGE_NT_HEADERS64, OptionalHeader) + header_.FileHeader.SizeOfOptionalHeader;
     for (unsigned k = 0; k < header_.FileHeader.NumberOfSections; ++k)
@@ -88,7 +93,7 @@ std::vector<std::string> exported(const std::string &file) {
   const auto table = part<IMAGE_EXPORT_DIRECTORY>(bytes, mapped.offset(where.VirtualAddress));
   for (uint32_t k = 0; k < table.NumberOfNames; ++k) {
     const uint64_t name = mapped.offset(part<uint32_t>(bytes, mapped.offset(table.AddressOfNames + 4 * k)));
-    part<char>(bytes, name);
+    if (name >= bytes.size()) not_pe();
     out.emplace_back(&bytes[name], strnlen(&bytes[name], bytes.size() - name));
   }
   std::sort(out.begin(), out.end());

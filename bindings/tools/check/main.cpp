@@ -114,6 +114,7 @@ std::string listed(const std::string &file) {
 
 int child(const Request &request) {
   report_to(request.report);
+  open_no_window_of_a_crash();
   leave(kDone);  // how it ends is for the parent to judge
   if (request.digest >= 0) send_verdict({Result::pass, digest_text(request)});
   else if (const Rule *rule = find_rule(request.rule)) send_verdict(judge(request, *rule, request.type));
@@ -132,7 +133,9 @@ std::vector<std::string> arguments(const Request &request, const std::string &ru
           "--type",
           std::to_string(type),
           "--seed",
-          std::to_string(request.seed)};
+          std::to_string(request.seed),
+          "--limit",
+          text("%.17g", request.limit)};
 }
 
 // What a sanitizer wrote, in one line; empty where it was silent.
@@ -329,10 +332,10 @@ int print_report(const Globals &globals, const Request &request, const Report &r
 int run(const Globals &globals, const Request &request) {
   if (request.report >= 0) return child(request);
   std::error_code error;
-  if (!std::filesystem::is_regular_file(request.file, error))
+  if (!std::filesystem::is_regular_file(path_of(request.file), error))
     return fail(
         request.file + ": " +
-        (std::filesystem::exists(request.file, error) ? "is no file" : "there is no such file") +
+        (std::filesystem::exists(path_of(request.file), error) ? "is no file" : "there is no such file") +
         "; expected the shared library of a plugin, such as ./mylaw.so, or a name of deform plugin list");
   std::vector<const Rule *> wanted;
   for (const std::string &id : request.only) {
@@ -349,7 +352,7 @@ int run(const Globals &globals, const Request &request) {
 // The file of a plugin that is found by its short name or full id; the same text where it is none of them.
 std::string file_of(const std::string &text, const Globals &globals) {
   std::error_code error;
-  const std::filesystem::file_status here = std::filesystem::status(text, error);
+  const std::filesystem::file_status here = std::filesystem::status(path_of(text), error);
   if ((exists(here) && !is_directory(here)) || text.find('/') != std::string::npos) return text;
   const std::unique_ptr<dfm_context, decltype(&dfm_context_destroy)> context(make_context(globals),
                                                                              dfm_context_destroy);

@@ -66,8 +66,9 @@ Host::Host() {
   table_.release = [](void *ctx, void *p, size_t, size_t) {
     if (Watch::watching()) Watch::stop("dfm_host.release");
     if (!p) return;
-    const auto lent = static_cast<Host *>(ctx)->lent_.extract(p);
-    if (lent) ::operator delete(p, lent.mapped());
+    Host &host = *static_cast<Host *>(ctx);
+    if (const auto lent = host.lent_.extract(p)) ::operator delete(p, lent.mapped());
+    else ++host.not_lent_;
   };
   table_.scratch = [](void *, size_t bytes) -> void * {
     if (!arena.bytes) arena.bytes = std::make_unique_for_overwrite<char[]>(Arena::kBytes);
@@ -119,10 +120,12 @@ BareContext bare_context() {
   dfm_context *made = nullptr;
   static int number = 0;
   std::error_code error;
-  const std::filesystem::path folder =
-      std::filesystem::temp_directory_path(error) / text("deform_check_%ld_%d", long(getpid()), number++);
+  const std::filesystem::path above = std::filesystem::temp_directory_path(error);
+  std::filesystem::path folder;
+  do folder = above / text("deform_check_%ld_%d", long(getpid()), number++);
+  while (!error && !std::filesystem::create_directory(folder, error) && !error);  // another one's is there
   dfm_context_def def = dfm_context_def_default();
-  if (std::filesystem::create_directory(folder, error)) {
+  if (!error) {
     const std::string name = cli::name_of(folder);
     def.plugin_dir = name.c_str();
     dfm_context_create(&def, &made);

@@ -21,6 +21,7 @@ class Host {
   const dfm_host &table() const { return table_; }
   dfm_host &table() { return table_; }
   size_t pieces() const { return lent_.size(); }  // not yet released
+  size_t not_lent() const { return not_lent_; }   // releases of what is not lent, or no longer
   const std::string &said() const { return said_; }
   void release_scratch();  // of this thread
   // How parallel_for cuts its work: by grains in order, not at all, by some grains in another order.
@@ -31,6 +32,7 @@ class Host {
  private:
   dfm_host table_{};
   std::map<void *, std::align_val_t> lent_;
+  size_t not_lent_ = 0;
   std::string said_;
 };
 

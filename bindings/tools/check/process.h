@@ -1,5 +1,6 @@
 // What runner_posix.cpp and runner_windows.cpp share: a child is heard and waited for in the same way.
 #pragma once
+#include <chrono>
 #include <functional>
 #include <string>
 
@@ -7,13 +8,18 @@
 
 namespace cli::check {
 
-int reports();                            // the descriptor of report_to()
-void keep_from_children(int descriptor);  // the system's
+int reports();  // the descriptor of report_to()
+void keep_from_children(int descriptor);
+
+inline constexpr const char *kNoPipe =
+    "no pipe could be opened for the process of a rule; close programs or raise the limit of open files";
+inline constexpr const char *kNoProcess =
+    "the system cannot start another process for a rule; close programs, or use --in-process";
 
 // What the child writes: its reports, and what comes on its standard streams, of which the start is kept.
-class Heard {
+class ChildOutput {
  public:
-  explicit Heard(Outcome &out) : out_(out) {}
+  explicit ChildOutput(Outcome &out) : out_(out) {}
   void take_report(const char *bytes, size_t n);
   void take_output(const char *bytes, size_t n);
 
@@ -23,19 +29,21 @@ class Heard {
 };
 
 // How long a child is waited for.
-class Patience {
+class TimeLimit {
  public:
-  Patience(const Limits &limits, Outcome &out, double clock)
-      : limits_(limits), out_(out), begun_(clock), moved_(clock) {}
-  // Takes the processor time of the child and the clock; true: it is to be ended. waits: is it waiting, for
-  // neither the processor nor a disk?
-  bool ends(double used, double clock, const std::function<bool()> &waits);
+  TimeLimit(const Limits &limits, Outcome &out) : limits_(limits), out_(out) {}
+  // Takes the processor time of the child; true: it is to be ended. waits: is it waiting, for neither the
+  // processor nor a disk?
+  bool ends(double used, const std::function<bool()> &waits);
   std::string ending() const;
 
  private:
+  using Clock = std::chrono::steady_clock;
   const Limits limits_;
   Outcome &out_;
-  double begun_, moved_, counted_ = 0;  // moved: when it last computed
+  const Clock::time_point begun_ = Clock::now();
+  Clock::time_point moved_ = begun_;  // when it last computed
+  double counted_ = 0;
   bool waited_ = false;
 };
 

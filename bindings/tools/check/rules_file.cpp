@@ -3,8 +3,6 @@
 #include <cctype>
 #include <cmath>
 #include <cstring>
-#include <filesystem>
-#include <cstdlib>
 #include <limits>
 
 #include "check/environment.h"

@@ -1,6 +1,5 @@
 // V05, V06, V09, V10: what a plugin does to the process it runs in.
 #include <cmath>
-#include <cstdio>
 #include <cstring>
 #include <limits>
 #include <thread>
@@ -268,6 +267,10 @@ void load_and_unload(const Subject &subject) {
         "after it was unloaded %zu piece%s of the host's memory %s still allocated; free them in release() "
         "or shutdown()",
         n, n == 1 ? "" : "s", n == 1 ? "is" : "are");
+  if (plugin.host().not_lent())
+    broken(
+        "it gave dfm_host.release a piece that it had released before, or that is not the host's; release "
+        "each piece once");
 }
 
 }  // namespace

@@ -92,7 +92,7 @@ Verdict run_here(const Rule &rule, const Subject &subject) {
   }
 }
 
-void Heard::take_report(const char *bytes, size_t n) {
+void ChildOutput::take_report(const char *bytes, size_t n) {
   pending_.append(bytes, n);
   for (size_t end; (end = pending_.find('\0')) != std::string::npos; pending_.erase(0, end + 1)) {
     const char letter = pending_[0];
@@ -106,22 +106,24 @@ void Heard::take_report(const char *bytes, size_t n) {
   }
 }
 
-void Heard::take_output(const char *bytes, size_t n) {
+void ChildOutput::take_output(const char *bytes, size_t n) {
   if (out_.said.size() < 65536) out_.said.append(bytes, n);
 }
 
-bool Patience::ends(double used, double clock, const std::function<bool()> &waits) {
+bool TimeLimit::ends(double used, const std::function<bool()> &waits) {
+  const Clock::time_point clock = Clock::now();
+  const std::chrono::duration<double> still = clock - moved_, all = clock - begun_;
   out_.seconds = used;
   if (used > counted_ + 1e-3) {
     counted_ = used;
     moved_ = clock;
   }
-  if (clock - moved_ > limits_.still && waits()) waited_ = true;
-  out_.late = waited_ || used > limits_.seconds || clock - begun_ > 10 * limits_.seconds;
+  if (still.count() > limits_.still && waits()) waited_ = true;
+  out_.late = waited_ || used > limits_.seconds || all.count() > 10 * limits_.seconds;
   return out_.late;
 }
 
-std::string Patience::ending() const {
+std::string TimeLimit::ending() const {
   return waited_
              ? text("did not come back: it has waited for %g s for something that never comes", limits_.still)
              : text("did not come back within %g s", limits_.seconds);

@@ -79,10 +79,7 @@ std::string ending_of(int status) {
 }
 
 void open_pipe(int ends[2]) {
-  if (pipe2(ends, O_CLOEXEC) != 0)
-    throw Failure(
-        kBadInput,
-        "no pipe could be opened for the process of a rule; close programs or raise the limit of open files");
+  if (pipe2(ends, O_CLOEXEC) != 0) throw Failure(kBadInput, kNoPipe);
 }
 
 // What the child wrote before it ended; a process that it left behind is not waited for.
@@ -104,15 +101,13 @@ Outcome in_fork(const std::function<void()> &work, const Limits &limits) {
   if (child == 0) become_child(work, report[1], output[1]);
   close(report[1]);
   close(output[1]);
-  if (child < 0)
-    throw Failure(kBadInput,
-                  "the system cannot start another process for a rule; close programs, or use --in-process");
+  if (child < 0) throw Failure(kBadInput, kNoProcess);
   Outcome out;
-  Heard heard(out);
+  ChildOutput heard(out);
   pollfd ends[2] = {{report[0], POLLIN, 0}, {output[0], POLLIN, 0}};
   clockid_t clock;
   const bool timed = clock_getcpuclockid(child, &clock) == 0;
-  Patience patience(limits, out, clock_of(CLOCK_MONOTONIC));
+  TimeLimit limit(limits, out);
   char buffer[4096];
   int status = 0;
   for (bool ended = false; !ended;) {
@@ -125,7 +120,7 @@ Outcome in_fork(const std::function<void()> &work, const Limits &limits) {
       else heard.take_output(buffer, size_t(n));
     }
     const double used = timed ? std::max(clock_of(clock), out.seconds) : 0;
-    if (!out.late && patience.ends(used, clock_of(CLOCK_MONOTONIC), [&] { return waits(child); })) {
+    if (!out.late && limit.ends(used, [&] { return waits(child); })) {
       kill(-child, SIGKILL);
       kill(child, SIGKILL);
     }
@@ -134,13 +129,15 @@ Outcome in_fork(const std::function<void()> &work, const Limits &limits) {
   read_rest(report[0], [&](const char *bytes, ssize_t n) { heard.take_report(bytes, size_t(n)); });
   read_rest(output[0], [&](const char *bytes, ssize_t n) { heard.take_output(bytes, size_t(n)); });
   kill(-child, SIGKILL);
-  if (!out.spoke) out.ending = out.late ? patience.ending() : ending_of(status);
+  if (!out.spoke) out.ending = out.late ? limit.ending() : ending_of(status);
   return out;
 }
 
 }  // namespace
 
 void keep_from_children(int descriptor) { fcntl(descriptor, F_SETFD, FD_CLOEXEC); }
+
+void open_no_window_of_a_crash() {}
 
 Outcome in_own_process(const std::function<void()> &work, const std::string &,
                        const std::vector<std::string> &, const Limits &limits) {

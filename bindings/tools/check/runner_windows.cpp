@@ -24,12 +24,6 @@ double processor_time(HANDLE process) {
   return seconds_of(system) + seconds_of(own);
 }
 
-double clock_now() {
-  FILETIME now;
-  GetSystemTimeAsFileTime(&now);
-  return seconds_of(now);
-}
-
 std::string ending_of(DWORD code) {
   switch (code) {
     case EXCEPTION_ACCESS_VIOLATION:
@@ -45,8 +39,7 @@ std::string ending_of(DWORD code) {
 // A pipe whose writing end the child gets.
 struct Pipe {
   Pipe() {
-    if (_pipe(ends, 65536, _O_BINARY | _O_NOINHERIT) != 0)
-      throw Failure(kBadInput, "no pipe could be opened for the process of a rule; close programs");
+    if (_pipe(ends, 65536, _O_BINARY | _O_NOINHERIT) != 0) throw Failure(kBadInput, kNoPipe);
   }
   ~Pipe() {
     for (const int end : ends) _close(end);
@@ -65,9 +58,11 @@ struct Pipe {
 };
 
 // While it lives, a descriptor of this process is another file's.
-struct Lent {
-  Lent(int descriptor, int file) : number(descriptor), saved(_dup(descriptor)) { _dup2(file, descriptor); }
-  ~Lent() {
+struct Redirected {
+  Redirected(int descriptor, int file) : number(descriptor), saved(_dup(descriptor)) {
+    _dup2(file, descriptor);
+  }
+  ~Redirected() {
     _dup2(saved, number);
     _close(saved);
   }
@@ -78,7 +73,9 @@ struct Lent {
 
 void keep_from_children(int descriptor) {
   SetHandleInformation(reinterpret_cast<HANDLE>(_get_osfhandle(descriptor)), HANDLE_FLAG_INHERIT, 0);
-  // what crashes opens no window
+}
+
+void open_no_window_of_a_crash() {
   SetErrorMode(SEM_FAILCRITICALERRORS | SEM_NOGPFAULTERRORBOX | SEM_NOOPENFILEERRORBOX);
 }
 
@@ -94,35 +91,34 @@ Outcome in_fresh_process(const std::string &command, std::vector<std::string> ar
   HANDLE child;
   {
     const int nothing = _open("NUL", _O_RDONLY | _O_NOINHERIT), to_report = _dup(report.ends[1]);
-    const Lent in(0, nothing), out(1, output.ends[1]), error(2, output.ends[1]);
+    const Redirected in(0, nothing), out(1, output.ends[1]), error(2, output.ends[1]);
     arguments.insert(arguments.end(), {"--report-to", std::to_string(to_report)});
     child = reinterpret_cast<HANDLE>(os::start(_P_NOWAIT, command, arguments));
     _close(to_report);
     _close(nothing);
   }
-  if (child == INVALID_HANDLE_VALUE)
-    throw Failure(kBadInput,
-                  "the system cannot start another process for a rule; close programs, or use --in-process");
-  // what it leaves behind ends with the job
+  if (child == INVALID_HANDLE_VALUE) throw Failure(kBadInput, kNoProcess);
+  // it and what it leaves behind end with the job, and so with this process
   const HANDLE job = CreateJobObjectW(nullptr, nullptr);
+  JOBOBJECT_EXTENDED_LIMIT_INFORMATION ends = {};
+  ends.BasicLimitInformation.LimitFlags = JOB_OBJECT_LIMIT_KILL_ON_JOB_CLOSE;
+  SetInformationJobObject(job, JobObjectExtendedLimitInformation, &ends, sizeof ends);
   AssignProcessToJobObject(job, child);
   Outcome out;
-  Heard heard(out);
-  Patience patience(limits, out, clock_now());
+  ChildOutput heard(out);
+  TimeLimit limit(limits, out);
   for (bool ended = false; !ended;) {
     ended = WaitForSingleObject(child, 5) == WAIT_OBJECT_0;
     report.take([&](const char *bytes, size_t n) { heard.take_report(bytes, n); });
     output.take([&](const char *bytes, size_t n) { heard.take_output(bytes, n); });
     // whether it waits the system does not say; time on the clock is limited, too
-    if (!out.late && patience.ends(processor_time(child), clock_now(), [] { return false; }))
-      TerminateProcess(child, 1);
+    if (!out.late && limit.ends(processor_time(child), [] { return false; })) TerminateProcess(child, 1);
   }
-  TerminateJobObject(job, 1);
   CloseHandle(job);
   DWORD code = 0;
   GetExitCodeProcess(child, &code);
   CloseHandle(child);
-  if (!out.spoke) out.ending = out.late ? patience.ending() : ending_of(code);
+  if (!out.spoke) out.ending = out.late ? limit.ending() : ending_of(code);
   return out;
 }
 

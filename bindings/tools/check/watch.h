@@ -80,7 +80,8 @@ class Fenced {
 
   // Runs f and turns a touch of a fence into a sentence; empty where there was none.
   static std::string guard(const std::function<void()> &f, const void **at = nullptr);
-  // Of the handler of faults, on its way back; what: "reads", "writes", or "touches" where it is unknown.
+  // The handler of faults calls it before it jumps back; what: "reads", "writes", or "touches" where it is
+  // unknown.
   static void tell(const void *at, const char *what);
 
  private:

@@ -18,6 +18,7 @@ from .executors import Dask, Local, executor as named_executor
 from .page import page, table
 from .spec import Residual, Study, read_study
 from .statistics import Spread
+from .store import require_posix
 from .sweep import out_folder
 from .tables import titled
 
@@ -258,6 +259,7 @@ def fit(study: Any, *, out: Any = None, executor: str = "local", workers: int | 
 
     out: folder for write() (out/STUDY); executor, workers, address: as of sweep(); tell: called with a
     sentence whenever the residuals have become smaller."""
+    require_posix()
     read = study if isinstance(study, Study) else read_study(study)
     _check(read)
     refuse_foreign(out_folder(read, out) / "fit.json", MARKS["fit.json"])  # before the search, not after it

@@ -14,13 +14,14 @@ MARK = '", "point": {'  # in each line
 SYNC_EVERY = 1.0  # s: what a loss of power may cost; the end of a process costs nothing
 
 
+def require_posix() -> None:
+    if os.name == "nt":
+        raise UnsupportedError("sweep and fit need POSIX: run them on Linux, or in WSL", "DFM_E_UNSUPPORTED")
+
+
 def hold(file: Any) -> None:
     """A lock that ends with this process; OSError: another one has it."""
-    try:
-        import fcntl
-    except ImportError:
-        raise UnsupportedError("sweep and fit lock their files in a way that this system has not",
-                               "DFM_E_UNSUPPORTED") from None
+    import fcntl
     fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 

@@ -13,7 +13,7 @@ from .executors import executor as named_executor
 from .page import page, table
 from .progress import Progress
 from .spec import Study, read_study
-from .store import Store
+from .store import Store, require_posix
 
 # What write() makes, and what tells that it was made by it.
 MARKS = {"sweep.csv": ",state,said,seconds", "sweep.html": "<title>Sweep ", "sweep.parquet": "deform sweep",
@@ -90,6 +90,7 @@ def sweep(study: Any, *, out: Any = None, executor: str = "local", workers: int 
     workers: how many (one for each processor); address: of a Dask scheduler. retry: makes failed runs again.
     only: (first, last) index of the runs to make, for a part of an array. progress: tells it on standard
     error."""
+    require_posix()
     read = study if isinstance(study, Study) else read_study(study)
     if not read.quantities:
         raise ArgumentError(f'{read.file}: /: a sweep needs "quantities", what is read of each run',
