@@ -120,7 +120,7 @@ endfunction()
 # The reader of scenes and the command compute little: without the dear passes of the optimizer they are
 # compiled in half the time.
 function(deform_computes_little target)
-  if(DEFORM_SANITIZE)
+  if(DEFORM_SANITIZE AND NOT DEFORM_FUZZ)   # fuzzers spend their time in the reader of scenes
     target_compile_options(${target} PRIVATE -O0)
   else()
     target_compile_options(${target} PRIVATE $<$<AND:$<CONFIG:Release>,$<CXX_COMPILER_ID:GNU>>:-Og>)

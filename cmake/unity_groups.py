@@ -3,7 +3,8 @@
 each file that has company; those of a group lie in one folder, except tests.
 
 Two files stay apart where a name that only one of them can see (in an anonymous namespace, static, a macro,
-a test) means something else in the other one. clang-format puts what is declared at file scope in column 0.
+a test) means something else in the other one, and where namespaces that they open have a name in common.
+clang-format puts what is declared at file scope in column 0.
 
 unity_groups.py MOST INCLUDE_FOLDERS FILE...   MOST: files of a group; INCLUDE_FOLDERS: separated by ':'
 """
@@ -63,7 +64,7 @@ class File:
                 own = not all(spaces) or line.startswith(("static ", "TEST", "using "))
                 found = declared(line)
                 (self.internal if own else self.names).update(found)
-                self.own_space.setdefault("::".join(spaces), set()).update(found)
+                self.own_space.setdefault("::".join(filter(None, spaces)), set()).update(found)
         if path.stem.endswith("_test"):   # a program of its own elsewhere
             self.internal |= self.names
 

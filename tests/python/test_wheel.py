@@ -30,7 +30,8 @@ class Wheel(unittest.TestCase):
         with tempfile.TemporaryDirectory(suffix=" with space") as name:
             folder = pathlib.Path(name)
             # the system's pip, where it has one: a venv's own takes seconds to unpack
-            own = ["--without-pip"] if importlib.util.find_spec("pip") else []
+            has = importlib.util.find_spec("pip") and sys.prefix == sys.base_prefix
+            own = ["--without-pip"] if has else []
             make = [sys.executable, "-m", "venv", "--system-site-packages", *own, folder / "venv"]
             subprocess.run(make, check=True, env=clean())
             python = folder / "venv" / "bin" / "python"

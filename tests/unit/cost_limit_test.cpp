@@ -178,7 +178,8 @@ TEST(CostQuantities, ProbeThatACutTakes_IsComparedUntilThen) {
     for (int i = 0; i <= 10; ++i) {
       const double t = 0.1 * i;
       const std::string x = i <= last ? std::to_string(t + off) + ",0,0,1,0,0" : "nan,nan,nan,nan,nan,nan";
-      probes << t << ",tip," << x << "\n" << t << ",com.b," << x << "\n" << t << ",com.left," << x << "\n";
+      for (const char *name : {"tip", "com.b", "com.left", "force"})
+        probes << t << "," << name << "," << x << "\n";
       bodies << t << ",b,0,0,0,0,0,0,0,0,1\n";
     }
     return to.string();
@@ -192,5 +193,7 @@ TEST(CostQuantities, ProbeThatACutTakes_IsComparedUntilThen) {
   EXPECT_EQ(truth.at("com.b").family, "com");
   EXPECT_EQ(truth.at("probe.com.b").values, of.values);
   EXPECT_EQ(truth.at("com.left").values, of.values);
+  EXPECT_EQ(truth.at("probe.force").values, of.values);
+  EXPECT_EQ(truth.count("force"), 0u) << "the word for the forces of all pairs";
   EXPECT_NEAR(error_of(of, other.at("tip"), 1), 0.02, 1e-6) << "the later records of the other side";
 }

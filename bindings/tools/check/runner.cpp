@@ -112,12 +112,12 @@ void ChildOutput::take_output(const char *bytes, size_t n) {
 
 bool TimeLimit::ends(double used, const std::function<bool()> &waits) {
   const Clock::time_point clock = Clock::now();
-  const std::chrono::duration<double> still = clock - moved_, all = clock - begun_;
   out_.seconds = used;
   if (used > counted_ + 1e-3) {
     counted_ = used;
     moved_ = clock;
   }
+  const std::chrono::duration<double> still = clock - moved_, all = clock - begun_;
   if (still.count() > limits_.still && waits()) waited_ = true;
   out_.late = waited_ || used > limits_.seconds || all.count() > 10 * limits_.seconds;
   return out_.late;

@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <limits>
+#include <set>
 
 #include "file.h"
 
@@ -49,13 +50,15 @@ Quantity &of(Quantities &all, const std::string &name, const char *family, const
   return q;
 }
 
-// After the others: a probe may have the name of one of them.
+// After the others: a probe may have the name of one of them, or the word for all figures of a kind.
 void read_probes(const Table &probes, Quantities &out) {
+  static const std::set<std::string> families = {"com",   "force", "work", "volume",  "energy",
+                                                 "touch", "slip",  "rest", "liftoff", "probe"};
   for (const Row &row : probes.rows) {
     const std::string &name = probes.text(row, "probe");
     if (!std::isfinite(probes.number(row, "x"))) continue;  // a cut has taken its cell
     const auto same = out.find(name);
-    const bool taken = same != out.end() && same->second.family != "probe";
+    const bool taken = families.count(name) || (same != out.end() && same->second.family != "probe");
     Quantity &q = of(out, taken ? "probe." + name : name, "probe", "m", 3);
     q.t.push_back(probes.number(row, "t"));
     for (const char *c : {"x", "y", "z"}) q.values.push_back(probes.number(row, c));
