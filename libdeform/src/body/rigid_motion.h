@@ -46,8 +46,8 @@ RigidMotion rigid_motion(uint32_t n, const double *mass, const Place &place, con
   out.mass = all;
   const double mean = (s[0] + s[1] + s[2]) / 3;
   if (!(mean > 0)) return out;
-  // Where the determinant is less than this part of the cube of the mean moment, the points are on a line. A
-  // spin about it moves nothing, so a small moment about it does no harm.
+  // Points are on a line where the determinant is below this part of the cube of the mean: a spin about it
+  // moves nothing, and the inverse is that of an inertia about it of this part of the mean.
   constexpr double kOnALine = 1e-9;
   const auto det_of = [&] {
     return dot(Vec3{s[0], s[5], s[4]}, cross(Vec3{s[5], s[1], s[3]}, Vec3{s[4], s[3], s[2]}));

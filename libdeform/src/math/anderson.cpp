@@ -7,27 +7,19 @@
 namespace dfm {
 namespace {
 
-using Two = double __attribute__((vector_size(16), aligned(8), may_alias));
-const Two &two(const double *at) { return *reinterpret_cast<const Two *>(at); }
-
 // One sum would wait for each addition; four sums run in parallel.
 double product(size_t n, const double *a, const double *b) {
-  Two low = {}, high = {};
+  double sum[4] = {};
   size_t k = 0;
-  for (; k + 4 <= n; k += 4) {
-    low += two(a + k) * two(b + k);
-    high += two(a + k + 2) * two(b + k + 2);
-  }
-  double sum[4] = {low[0], low[1], high[0], high[1]};
+  for (; k + 4 <= n; k += 4)
+    for (size_t i = 0; i < 4; ++i) sum[i] += a[k + i] * b[k + i];
   for (; k < n; ++k) sum[k % 4] += a[k] * b[k];
   return (sum[0] + sum[1]) + (sum[2] + sum[3]);
 }
 
 // to -= by a
 void subtract(size_t n, double by, const double *a, double *to) {
-  size_t k = 0;
-  for (; k + 2 <= n; k += 2) *reinterpret_cast<Two *>(to + k) -= by * two(a + k);
-  for (; k < n; ++k) to[k] -= by * a[k];
+  for (size_t k = 0; k < n; ++k) to[k] -= by * a[k];
 }
 
 }  // namespace
