@@ -178,8 +178,8 @@ TEST(CostQuantities, ProbeThatACutTakes_IsComparedUntilThen) {
     for (int i = 0; i <= 10; ++i) {
       const double t = 0.1 * i;
       const std::string x = i <= last ? std::to_string(t + off) + ",0,0,1,0,0" : "nan,nan,nan,nan,nan,nan";
-      for (const char *name : {"tip", "com.b", "com.left", "force"})
-        probes << t << "," << name << "," << x << "\n";
+      for (const char *probe : {"tip", "com.b", "com.left", "force"})
+        probes << t << "," << probe << "," << x << "\n";
       bodies << t << ",b,0,0,0,0,0,0,0,0,1\n";
     }
     return to.string();
