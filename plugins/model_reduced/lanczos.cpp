@@ -5,7 +5,6 @@
 #include <Eigen/Dense>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "sparse.h"
@@ -15,89 +14,14 @@ namespace {
 
 // Below this share of the largest value a pair is one of C's kernel. Relative residual required.
 constexpr double kKernel = 1e-13, kAccuracy = 1e-13;
-constexpr const char *kFlat = "the modes of the mesh were not found: its cells are too flat";
 constexpr double kNothing = 1e-10;  // of a vector that was left beside those before
 constexpr size_t kLook = 3;         // blocks between two looks at what has converged
-
-double random(uint64_t &state) {
-  state = state * 6364136223846793005u + 1442695040888963407u;
-  return double(int64_t(state) >> 11) * 0x1p-52;
-}
-
-// Eigenpairs of a matrix, values falling, vectors in the columns; none of its kernel.
-struct Largest {
-  Eigen::VectorXd value;
-  Eigen::MatrixXd vector;
-};
-
-// z = (T - shift)^-1 z, T tridiagonal with `beside` its diagonal: elimination with exchange of rows. A pivot
-// of less than `least` is that.
-void solve_shifted(const Eigen::VectorXd &diagonal, const Eigen::VectorXd &beside, double shift, double least,
-                   Eigen::VectorXd &z) {
-  const Eigen::Index n = diagonal.size();
-  std::vector<std::array<double, 3>> upper;
-  const auto keep = [&](std::array<double, 3> row) {
-    if (!(std::fabs(row[0]) > least)) row[0] = least;
-    upper.push_back(row);
-    return row;
-  };
-  std::array<double, 3> row{diagonal[0] - shift, n > 1 ? beside[0] : 0, 0};
-  for (Eigen::Index i = 0; i + 1 < n; ++i) {
-    std::array<double, 3> next{beside[i], diagonal[i + 1] - shift, i + 2 < n ? beside[i + 1] : 0};
-    if (std::fabs(next[0]) > std::fabs(row[0])) {
-      std::swap(row, next);
-      std::swap(z[i], z[i + 1]);
-    }
-    row = keep(row);
-    const double part = next[0] / row[0];
-    z[i + 1] -= part * z[i];
-    row = {next[1] - part * row[1], next[2] - part * row[2], 0};
-  }
-  keep(row);
-  for (Eigen::Index i = n; i-- > 0;) {
-    const auto &u = upper[size_t(i)];
-    if (i + 1 < n) z[i] -= u[1] * z[i + 1];
-    if (i + 2 < n) z[i] -= u[2] * z[i + 2];
-    z[i] /= u[0];
-  }
-}
-
-// Of the symmetric a: by its tridiagonal form, the vectors by inverse iteration, each beside those before it,
-// so that copies of a multiple value have their own. Values take n^2 operations and vectors a few n, where
-// all vectors together would take several times as long as the form.
-Largest largest_of(const Eigen::MatrixXd &a, size_t count) {
-  const Eigen::Tridiagonalization<Eigen::MatrixXd> form(a);
-  const Eigen::VectorXd diagonal = form.diagonal(), beside = form.subDiagonal();
-  Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver;
-  solver.computeFromTridiagonal(diagonal, beside, Eigen::EigenvaluesOnly);
-  if (solver.info() != Eigen::Success) throw kFlat;
-  const Eigen::VectorXd values = solver.eigenvalues().reverse();
-  const Eigen::Index n = values.size();
-  Eigen::Index m = 0;
-  while (m < std::min(Eigen::Index(count), n) && values[m] > kKernel * values[0]) ++m;
-  Largest out{values.head(m), Eigen::MatrixXd(n, m)};
-  uint64_t state = 0x9e3779b97f4a7c15u;
-  Eigen::VectorXd z(n);
-  for (Eigen::Index k = 0; k < m; ++k) {
-    for (double &each : z) each = random(state);
-    for (int round = 0; round < 4; ++round) {
-      solve_shifted(diagonal, beside, values[k], 1e-16 * values[0], z);
-      z.normalize();
-      for (int twice = 0; twice < 2; ++twice)
-        z -= out.vector.leftCols(k) * (out.vector.leftCols(k).transpose() * z);
-      z.normalize();
-    }
-    out.vector.col(k) = z;
-  }
-  out.vector.applyOnTheLeft(form.matrixQ());
-  return out;
-}
 
 class Krylov {
  public:
   Krylov(const Kernels &kernels, size_t size, const Apply &c) : kernels_(kernels), size_(size), c_(c) {
     std::vector<double> x(kLanes * size);
-    for (double &a : x) a = random(state_);
+    for (double &a : x) a = random();
     begin_block();
     c_(x.data(), last());
     orthonormalize();
@@ -120,29 +44,34 @@ class Krylov {
       }
     orthonormalize();
   }
-  // The pairs of the block before the last, values falling; how far they are from true ones is what goes over
+  // The pairs of the block before the last: values rising; how far they are from true ones is what goes over
   // to the last block.
   bool converged(size_t count) {
     const Eigen::Index m = Eigen::Index(width() - kLanes);
     if (m < Eigen::Index(count)) return false;
     const Eigen::MatrixXd t = t_.topLeftCorner(m, m).selfadjointView<Eigen::Upper>();
-    largest_ = largest_of(t, count);
-    const Eigen::MatrixXd over = r_ * largest_.vector.bottomRows(kLanes);
-    for (Eigen::Index k = 0; k < over.cols(); ++k)
-      if (!(over.col(k).norm() <= kAccuracy * largest_.value[k])) return false;
+    solver_.compute(t);
+    if (solver_.info() != Eigen::Success) return false;
+    for (size_t k = 0; k < count; ++k) {
+      const Eigen::VectorXd over = r_ * solver_.eigenvectors().col(m - 1 - Eigen::Index(k)).tail(kLanes);
+      const double value = solver_.eigenvalues()[m - 1 - Eigen::Index(k)];
+      if (value > kKernel * solver_.eigenvalues()[m - 1] && !(over.norm() <= kAccuracy * value)) return false;
+    }
     return true;
   }
-  Pairs pairs() const {
+  Pairs pairs(size_t count) const {
     Pairs out;
-    const Eigen::Index m = largest_.vector.rows();
-    for (Eigen::Index k = 0; k < largest_.value.size(); ++k) {
-      const auto part = largest_.vector.col(k);
+    const Eigen::Index m = solver_.eigenvalues().size();
+    for (size_t k = 0; k < count; ++k) {
+      const double value = solver_.eigenvalues()[m - 1 - Eigen::Index(k)];
+      if (!(value > kKernel * solver_.eigenvalues()[m - 1])) break;
+      const auto part = solver_.eigenvectors().col(m - 1 - Eigen::Index(k));
       std::vector<double> x(size_);
       for (size_t b = 0; b < size_t(m); b += kLanes)
         for (size_t i = 0; i < size_; ++i)
           for (size_t l = 0; l < kLanes; ++l)
             x[i] += v_[b * size_ + kLanes * i + l] * part[Eigen::Index(b + l)];
-      out.value.push_back(largest_.value[k]);
+      out.value.push_back(value);
       out.vector.push_back(std::move(x));
     }
     return out;
@@ -150,6 +79,10 @@ class Krylov {
   size_t width() const { return v_.size() / size_; }
 
  private:
+  double random() {
+    state_ = state_ * 6364136223846793005u + 1442695040888963407u;
+    return double(int64_t(state_) >> 11) * 0x1p-52;
+  }
   double *last() { return v_.data() + v_.size() - kLanes * size_; }
   void begin_block() { v_.resize(v_.size() + kLanes * size_); }
   void widen(size_t width) {
@@ -190,7 +123,7 @@ class Krylov {
   uint64_t state_ = 0x9e3779b97f4a7c15u;
   std::vector<double> v_;  // blocks [size, kLanes], columns orthonormal or zero
   Eigen::MatrixXd t_, r_;  // V^T C V; [kLanes,kLanes]
-  Largest largest_;
+  Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver_;
 };
 
 Pairs all_pairs(size_t size, const Apply &c, size_t count) {
@@ -205,10 +138,18 @@ Pairs all_pairs(size_t size, const Apply &c, size_t count) {
       for (size_t i = 0; i < size; ++i) full(Eigen::Index(i), Eigen::Index(k + l)) = response[kLanes * i + l];
     }
   }
-  const Largest largest = largest_of(0.5 * (full + full.transpose()), count);
+  const Eigen::MatrixXd symmetric = 0.5 * (full + full.transpose());
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(symmetric);
+  if (solver.info() != Eigen::Success) throw "the modes of the mesh were not found: its cells are too flat";
   Pairs out;
-  out.value.assign(largest.value.begin(), largest.value.end());
-  for (const auto &column : largest.vector.colwise()) out.vector.emplace_back(column.begin(), column.end());
+  const Eigen::Index last = Eigen::Index(size) - 1;
+  for (size_t k = 0; k < std::min(count, size); ++k) {
+    const double value = solver.eigenvalues()[last - Eigen::Index(k)];
+    if (!(value > kKernel * solver.eigenvalues()[last])) break;
+    const auto column = solver.eigenvectors().col(last - Eigen::Index(k));
+    out.value.push_back(value);
+    out.vector.emplace_back(column.data(), column.data() + size);
+  }
   return out;
 }
 
@@ -219,7 +160,7 @@ Pairs largest_pairs(const Kernels &kernels, size_t size, const Apply &c, size_t 
   Krylov space(kernels, size, c);
   for (size_t block = 1; space.width() + 2 * kLanes < size; ++block) {
     space.grow();
-    if (block % kLook == 0 && space.converged(count)) return space.pairs();
+    if (block % kLook == 0 && space.converged(count)) return space.pairs(count);
   }
   throw "the modes of the mesh were not found: its cells are too flat, or fewer modes are needed";
 }
