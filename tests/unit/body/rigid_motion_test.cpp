@@ -7,8 +7,8 @@ namespace {
 
 using namespace dfm;
 
-// Three points of 1 kg at -1, 0 and 1 m along a direction that is no axis turn about one across it: moment 2 kg
-// m2, and every point has the velocity that it was given.
+// Three points of 1 kg at -1, 0 and 1 m along a direction that is no axis turn about one across it: moment
+// 2 kg m2, and every point has the velocity that it was given.
 TEST(RigidMotion, PointsOnAnObliqueLine_TurnAcrossIt) {
   const Vec3 along = (1.0 / 3) * Vec3{1, 2, 2}, across = (1.0 / 3) * Vec3{2, 1, -2};
   const double mass[3] = {1, 1, 1};
