@@ -122,6 +122,7 @@ write_basic_package_version_file(${PROJECT_BINARY_DIR}/cmake/deformConfigVersion
 install(FILES ${PROJECT_BINARY_DIR}/cmake/deformConfig.cmake
   ${PROJECT_BINARY_DIR}/cmake/deformConfigVersion.cmake
   ${PROJECT_SOURCE_DIR}/cmake/DeformPlugin.cmake ${PROJECT_SOURCE_DIR}/cmake/deform_plugin.map
+  ${PROJECT_SOURCE_DIR}/cmake/plugin_mingw.cpp
   DESTINATION ${deform_cmake_dir} COMPONENT dev)
 
 # An archive is all there is to link then, so `pkg-config --libs` names what it needs even without --static.

@@ -38,4 +38,8 @@ function(deform_add_plugin name)
   deform_plugin_rules(${name} ${ARGN})
   set_target_properties(${name} PROPERTIES PREFIX "")
   deform_exports(${name} ${CMAKE_CURRENT_FUNCTION_LIST_DIR}/deform_plugin.map)
+  if(MINGW AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND "${ARGN}" MATCHES "\\.(cpp|cc|cxx)(;|$)")
+    target_sources(${name} PRIVATE ${CMAKE_CURRENT_FUNCTION_LIST_DIR}/plugin_mingw.cpp)
+    target_link_options(${name} PRIVATE -static)   # a run-time library of its own
+  endif()
 endfunction()

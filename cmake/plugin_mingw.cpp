@@ -1,5 +1,5 @@
-// Of each shipped plugin in C++: the run-time library inside it takes 73 kB at load, for exceptions where
-// memory has run out, and gives them back when it is told to.
+// In each C++ plugin by MinGW: the run-time library inside it takes 73 kB at load, for exceptions where no
+// memory is left, and gives them back when it is told to.
 namespace __gnu_cxx {
 void __freeres();
 }

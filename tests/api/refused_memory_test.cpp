@@ -147,7 +147,7 @@ dfm_world changing(dfm_context *c) {
 using Hashes = std::array<uint64_t, kSteps>;  // after each step
 
 // Steps with the n-th allocation from here on refused; what failed is tried again with memory back. Whether
-// the n-th was reached. Two more steps follow that, of every eighth walk all.
+// the n-th was reached. Two more steps follow that; every eighth walk goes to the end.
 bool walk(dfm_context *c, const Build &build, int64_t n, const Hashes &expected, int *refused) {
   const dfm_world w = build(c);
   Refusal::arm(n);

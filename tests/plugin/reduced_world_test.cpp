@@ -4,25 +4,33 @@
 
 namespace {
 
-struct World {
+// A world, and what the body to be made in it has.
+struct Setting {
   test::Context context;
   dfm_world world;
+  test::BodyOptions o;
+  Setting(const std::string &model, double young, std::array<double, 3> gravity = {0, 0, -9.81},
+          uint32_t threads = 1)
+      : context(threads), world(test::make_world(context, gravity)) {
+    o.model = model;
+    o.young = young;
+  }
+  ~Setting() { dfm_world_destroy(world); }
+  Setting(const Setting &) = delete;
+};
+
+struct World : Setting {
   dfm_body body;
   World(const std::string &model, const char *law, double mu, std::array<double, 3> gravity, double z,
         uint32_t threads = 1, double young = 2e5)
-      : context(threads) {
-    world = test::make_world(context, gravity);
-    test::BodyOptions o;
+      : Setting(model, young, gravity, threads) {
     o.name = "block";
-    o.model = model;
-    o.young = young;
     o.damping_stiffness = 2e-3;
     o.position = {0, 0, z};
     body = test::make_body(context, world, "beam", {0.1, 0.1, 0.1}, 60, o);
     test::add_plane(world, "floor");
     test::set_friction(world, mu, law);
   }
-  ~World() { dfm_world_destroy(world); }
 };
 
 double normal_force(dfm_world world) {
@@ -183,7 +191,6 @@ TEST_P(ReducedWorld, FreeSpinningPlate_StaysBoundedForTenThousandSteps) {
     }
 }
 
-// The error is the model's own reason.
 // Far beyond small strains, where these models are wrong, no energy comes of it: a soft heavy ball is
 // squeezed to a fraction of its volume, from a height and spinning.
 // unsanitized: too slow there; shorter tests run the same code
@@ -191,26 +198,21 @@ TEST_P(ReducedWorld, SqueezedFarBeyondSmallStrains_GainsNoEnergy) {
   for (const double young : {2e4, 5e3})
     for (const double spin : {0.0, 3.0}) {
       SCOPED_TRACE(testing::Message() << young << " Pa, " << spin << " rad/s");
-      test::Context context;
-      const dfm_world world = test::make_world(context);
-      test::add_plane(world, "floor");
-      test::BodyOptions o;
-      o.model = GetParam();
-      o.young = young;
-      o.position = {0, 0, 1.5};
-      o.spin = {0, spin, 0};
-      const dfm_body ball = test::make_body(context, world, "ball", {1.0}, 500, o);
+      Setting w(GetParam(), young);
+      test::add_plane(w.world, "floor");
+      w.o.position = {0, 0, 1.5};
+      w.o.spin = {0, spin, 0};
+      const dfm_body ball = test::make_body(w.context, w.world, "ball", {1.0}, 500, w.o);
       const auto energy = [&] { return test::total_energy(ball); };
       const double start = energy();
       double most = start, least_volume = HUGE_VAL;
       for (int i = 0; i < 30; ++i) {
-        test::run(world, 0.1, 1e-3);
+        test::run(w.world, 0.1, 1e-3);
         most = std::max(most, energy());
         least_volume = std::min(least_volume, test::measure(ball).volume);
       }
       EXPECT_LT(least_volume, 0.6 * test::measure(ball).rest_volume);
       EXPECT_LT(most, 1.01 * start);
-      dfm_world_destroy(world);
     }
 }
 
@@ -220,28 +222,23 @@ TEST_P(ReducedWorld, ThrownOnACorner_GainsNoEnergy) {
   for (const double young : {3e5, 1.5e6, 1e7})
     for (const double turned : {0.0, 0.3}) {
       SCOPED_TRACE(testing::Message() << young << " Pa, " << turned);
-      test::Context context;
-      const dfm_world world = test::make_world(context, {2.9, 0, -9.37});
-      test::add_plane(world, "floor");
-      test::set_friction(world, 3);
-      test::BodyOptions o;
-      o.model = GetParam();
-      o.young = young;
-      o.density = 434;
-      o.position = {0, 0, 0.05};
-      o.rotation = {turned, 0.1, 0, std::sqrt(0.99 - turned * turned)};
-      o.velocity = {-1.53, 2.61, -1.12};
-      const dfm_body box = test::make_body(context, world, "beam", {0.035, 0.019, 0.0336}, 12, o);
+      Setting w(GetParam(), young, {2.9, 0, -9.37});
+      test::add_plane(w.world, "floor");
+      test::set_friction(w.world, 3);
+      w.o.density = 434;
+      w.o.position = {0, 0, 0.05};
+      w.o.rotation = {turned, 0.1, 0, std::sqrt(0.99 - turned * turned)};
+      w.o.velocity = {-1.53, 2.61, -1.12};
+      const dfm_body box = test::make_body(w.context, w.world, "beam", {0.035, 0.019, 0.0336}, 12, w.o);
       const auto energy = [&] {
         const dfm_body_measure m = test::measure(box);
         return m.kinetic + m.elastic - m.mass * (2.9 * m.com[0] - 9.37 * m.com[2]);
       };
       const double start = energy();
       for (int i = 0; i < 60; ++i) {
-        test::ok(dfm_world_step(world, 1.0 / 60, nullptr));
+        test::ok(dfm_world_step(w.world, 1.0 / 60, nullptr));
         EXPECT_LT(energy(), start + 0.02 * std::fabs(start)) << i;
       }
-      dfm_world_destroy(world);
     }
 }
 
@@ -249,32 +246,28 @@ TEST_P(ReducedWorld, ThrownOnACorner_GainsNoEnergy) {
 // (doc/decisions/energy_watch.md): it was shorter by cos 1 for a moment, with up to 130 times its energy.
 TEST_P(ReducedWorld, TurnedInALongStep_GainsNoEnergy) {
   for (const double young : {1e5, 1e7}) {
-    test::Context context;
-    const dfm_world world = test::make_world(context);
-    test::add_plane(world, "floor");
-    test::BodyOptions o;
-    o.model = GetParam();
-    o.young = young;
-    o.damping_stiffness = 200 / young;
-    o.position = {0, 0, 0.3};
-    o.rotation = {0, 0.17364817766693033, 0, 0.984807753012208};
-    const dfm_body beam = test::make_body(context, world, "beam", {0.3, 0.05, 0.05}, 200, o);
+    Setting w(GetParam(), young);
+    test::add_plane(w.world, "floor");
+    w.o.damping_stiffness = 200 / young;
+    w.o.position = {0, 0, 0.3};
+    w.o.rotation = {0, 0.17364817766693033, 0, 0.984807753012208};
+    const dfm_body beam = test::make_body(w.context, w.world, "beam", {0.3, 0.05, 0.05}, 200, w.o);
     const auto energy = [&] { return test::total_energy(beam); };
     const double start = energy();
-    const std::string before = test::snapshot(world);
+    const std::string before = test::snapshot(w.world);
     for (const double last : {0.033, 0.05, 0.1})
       for (int steps = 9; steps < 18; ++steps) {
         SCOPED_TRACE(testing::Message() << young << " Pa, " << steps << " steps, then " << last << " s");
-        test::ok(dfm_world_restore(world, before.data(), before.size()));
+        test::ok(dfm_world_restore(w.world, before.data(), before.size()));
         for (int i = 0; i < steps + 20; ++i) {
-          test::ok(dfm_world_step(world, i == steps ? last : 0.016, nullptr));
+          test::ok(dfm_world_step(w.world, i == steps ? last : 0.016, nullptr));
           EXPECT_LT(energy(), 1.01 * start) << i;
         }
       }
-    dfm_world_destroy(world);
   }
 }
 
+// The error is the model's own reason.
 TEST_P(ReducedWorld, PartlyHeldAndTurnedByItsPose_IsRefusedWithTheReason) {
   test::Context context(1);
   const dfm_world world = test::make_world(context, {});

@@ -255,10 +255,7 @@ class Scene {
   void set_law(const char *partner) {
     const std::string name = law();
     LawValues v;
-    if (name != "none") v.push_back({"mu_C", kMu});
-    if (name != "none" && name != "dahl") v.push_back({"mu_S", kMu});
-    if (name == "dahl" || name == "lugre" || name == "elastoplastic") v.push_back({"sigma0", hold::kSigma0});
-    if (name == "lugre" || name == "elastoplastic") v.push_back({"sigma1", 1e3});
+    if (name != "none") v = hold::values_of(name, kMu);
     // slipping elements follow the normal force within mu p / C = 20 us (doc/laws/gms.md, limits)
     if (name == "gms") v.push_back({"C", 1e7});
     must(add_friction(world, name.c_str(), v, "upper", partner));

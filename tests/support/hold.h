@@ -45,12 +45,16 @@ struct Result {
 
 inline bool promises_stiction(const std::string &law) { return law != "dahl" && law != "lugre"; }
 
-inline void set_law(dfm_world w, const std::string &law) {
-  LawValues v{{"mu_C", kMu}};
-  if (law != "dahl") v.push_back({"mu_S", kMu});
+inline LawValues values_of(const std::string &law, double mu) {
+  LawValues v{{"mu_C", mu}};
+  if (law != "dahl") v.push_back({"mu_S", mu});
   if (law == "dahl" || law == "lugre" || law == "elastoplastic") v.push_back({"sigma0", kSigma0});
   if (law == "lugre" || law == "elastoplastic") v.push_back({"sigma1", 1e3});
-  ok(add_friction(w, law.c_str(), v));
+  return v;
+}
+
+inline void set_law(dfm_world w, const std::string &law) {
+  ok(add_friction(w, law.c_str(), values_of(law, kMu)));
 }
 
 // Scale from `from` to `to` along a smooth step within [t0, t1].

@@ -199,8 +199,8 @@ def refuse_foreign(path: pathlib.Path, mark: str) -> None:
     except (FileNotFoundError, NotADirectoryError):
         return
     if found and mark.encode() not in found:
-        raise FileError(f"{path}: another program wrote this file, or an earlier deform; remove it, or give "
-                        f"another folder (--out)", "DFM_E_IO")
+        raise FileError(f"{path}: another program wrote this file, or an earlier deform, and it stays as it "
+                        f"is; give another folder (--out), or move the file", "DFM_E_IO")
 
 
 def write_whole(path: pathlib.Path, data: bytes, mark: str = "") -> None:

@@ -114,7 +114,7 @@ std::string listed(const std::string &file) {
 
 int child(const Request &request) {
   report_to(request.report);
-  open_no_window_of_a_crash();
+  suppress_crash_dialogs();
   leave(kDone);  // how it ends is for the parent to judge
   if (request.digest >= 0) send_verdict({Result::pass, digest_text(request)});
   else if (const Rule *rule = find_rule(request.rule)) send_verdict(judge(request, *rule, request.type));

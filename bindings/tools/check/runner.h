@@ -17,7 +17,7 @@ void stage(const char *format, ...) DEFORM_PRINTF(1, 2);
 
 // The child's side: where stages and the verdict go; -1: this process is not a child.
 void report_to(int descriptor);
-void open_no_window_of_a_crash();  // in which Windows would wait for an answer
+void suppress_crash_dialogs();  // of Windows, which wait for an answer
 
 struct Outcome {
   bool spoke = false;  // the process gave a verdict

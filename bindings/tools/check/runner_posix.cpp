@@ -137,7 +137,7 @@ Outcome in_fork(const std::function<void()> &work, const Limits &limits) {
 
 void keep_from_children(int descriptor) { fcntl(descriptor, F_SETFD, FD_CLOEXEC); }
 
-void open_no_window_of_a_crash() {}
+void suppress_crash_dialogs() {}
 
 Outcome in_own_process(const std::function<void()> &work, const std::string &,
                        const std::vector<std::string> &, const Limits &limits) {

@@ -75,7 +75,7 @@ void keep_from_children(int descriptor) {
   SetHandleInformation(reinterpret_cast<HANDLE>(_get_osfhandle(descriptor)), HANDLE_FLAG_INHERIT, 0);
 }
 
-void open_no_window_of_a_crash() {
+void suppress_crash_dialogs() {
   SetErrorMode(SEM_FAILCRITICALERRORS | SEM_NOGPFAULTERRORBOX | SEM_NOOPENFILEERRORBOX);
 }
 

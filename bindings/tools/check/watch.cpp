@@ -81,6 +81,13 @@ void Watch::exchange(bool ours) {
   }
 }
 
+const char *Watch::run(const std::function<void()> &f) {
+  exchange(true);
+  call(f);
+  exchange(false);
+  return std::exchange(caught, nullptr);
+}
+
 // ---- static variables -------------------------------------------------------------------------------------
 
 StaticsLocked::StaticsLocked(const void *inside) {
@@ -140,6 +147,14 @@ bool Fenced::spoilt(long *offset) const {
 
 // Formats with snprintf in a handler: the fault is the law's own, at a known place of its code, and this
 // process ends with the rule.
+std::string Fenced::guard(const std::function<void()> &f, const void **at) {
+  sentence[0] = 0;
+  touched = nullptr;
+  call(f);
+  if (at) *at = touched;
+  return sentence;
+}
+
 void Fenced::tell(const void *where, const char *what) {
   const unsigned char *at = static_cast<const unsigned char *>(where);
   touched = at;

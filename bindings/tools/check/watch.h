@@ -28,8 +28,9 @@ class Watch {
     void *ours, *theirs;
   };
   void exchange(bool ours);
-  void find();                                // the system's; calls look_at for each entry
-  void look_at(void **at, const char *name);  // if that is one of those, the entry is made writable
+  static void call(const std::function<void()> &f);  // the system's; returns early where f has called stop()
+  void find();                                       // the system's; calls look_at for each entry
+  void look_at(void **at, const char *name);         // if that is one of those, the entry is made writable
   static const char *caught;
   static bool active;
   std::vector<Slot> slots_;
@@ -80,11 +81,11 @@ class Fenced {
 
   // Runs f and turns a touch of a fence into a sentence; empty where there was none.
   static std::string guard(const std::function<void()> &f, const void **at = nullptr);
-  // The handler of faults calls it before it jumps back; what: "reads", "writes", or "touches" where it is
-  // unknown.
+  // What a fault at `at` did: "reads", "writes", or "touches" where that is unknown.
   static void tell(const void *at, const char *what);
 
  private:
+  static void call(const std::function<void()> &f);  // the system's; ends f at a fault, which it has told
   static char sentence[256];
   static const void *touched;  // where; null where there was no touch
   static std::vector<Fenced *> all;

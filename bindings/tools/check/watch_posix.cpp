@@ -10,7 +10,6 @@
 #include <cstring>
 #include <functional>
 #include <new>
-#include <utility>
 
 #include "check/watch.h"
 
@@ -108,13 +107,8 @@ void Watch::find() {
   dl_iterate_phdr(look_into, &look);
 }
 
-const char *Watch::run(const std::function<void()> &f) {
-  if (sigsetjmp(back_from_call, 0) == 0) {
-    exchange(true);
-    f();
-  }
-  exchange(false);
-  return std::exchange(caught, nullptr);
+void Watch::call(const std::function<void()> &f) {
+  if (sigsetjmp(back_from_call, 0) == 0) f();
 }
 
 void Watch::stop(const char *name) {
@@ -179,9 +173,7 @@ void on_fault(int, siginfo_t *info, [[maybe_unused]] void *context) {
 
 }  // namespace
 
-std::string Fenced::guard(const std::function<void()> &f, const void **at) {
-  sentence[0] = 0;
-  touched = nullptr;
+void Fenced::call(const std::function<void()> &f) {
   struct sigaction action{};
   struct sigaction before_segv;
   struct sigaction before_bus;
@@ -192,8 +184,6 @@ std::string Fenced::guard(const std::function<void()> &f, const void **at) {
   if (sigsetjmp(back_from_fault, 1) == 0) f();
   sigaction(SIGSEGV, &before_segv, nullptr);
   sigaction(SIGBUS, &before_bus, nullptr);
-  if (at) *at = touched;
-  return sentence;
 }
 
 }  // namespace cli::check

@@ -6,7 +6,6 @@
 #include <cstring>
 #include <new>
 #include <string>
-#include <utility>
 
 #include "check/watch.h"
 
@@ -84,13 +83,8 @@ void Watch::find() {
   }
 }
 
-const char *Watch::run(const std::function<void()> &f) {
-  if (DEFORM_SET_BACK(back_from_call) == 0) {
-    exchange(true);
-    f();
-  }
-  exchange(false);
-  return std::exchange(caught, nullptr);
+void Watch::call(const std::function<void()> &f) {
+  if (DEFORM_SET_BACK(back_from_call) == 0) f();
 }
 
 void Watch::stop(const char *name) {
@@ -134,14 +128,10 @@ LONG CALLBACK on_fault(EXCEPTION_POINTERS *at) {
 
 }  // namespace
 
-std::string Fenced::guard(const std::function<void()> &f, const void **at) {
-  sentence[0] = 0;
-  touched = nullptr;
+void Fenced::call(const std::function<void()> &f) {
   void *const handler = AddVectoredExceptionHandler(1, on_fault);
   if (DEFORM_SET_BACK(back_from_fault) == 0) f();
   RemoveVectoredExceptionHandler(handler);
-  if (at) *at = touched;
-  return sentence;
 }
 
 }  // namespace cli::check

@@ -76,7 +76,9 @@ std::string MeshFiles::path_of(const std::string &path) const {
 }
 
 bool MeshFiles::has_cells(const std::string &path, const std::string &pointer) {
-  if (meshes_.count(kCells + path)) return true;
+  if (known_ && (known_->has(kCells + path) || known_->surface_only_.count(path)))
+    return known_->has(kCells + path);
+  if (has(kCells + path)) return true;
   if (surface_only_.count(path)) return false;
   dfm_mesh_handle mesh = 0;
   def_.require(dfm_mesh_load(context_, path.c_str(), DFM_MESH_ANY, &mesh), pointer);
@@ -93,6 +95,7 @@ std::string MeshFiles::make(const Body &b) {
   const MadeMesh &m = b.made;
   const std::string name = format("/dev/null/%s %a %a %a %u %u", m.kind.c_str(), m.size[0], m.size[1],
                                   m.size[2], m.cells, m.order);
+  if (known_ && known_->has(kCells + name)) return name;
   dfm_mesh_handle &mesh = meshes_[kCells + name];
   if (mesh) return name;
   def_.require(dfm_mesh_make(context_, m.kind.c_str(), m.size, DFM_MESH_CELLS, m.cells, &mesh),

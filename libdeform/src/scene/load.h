@@ -18,12 +18,15 @@ inline constexpr double kTetsOfHexahedron = 12;
 
 class MeshFiles {
  public:
-  MeshFiles(dfm_context *context, const Definition &def) : context_(context), def_(def) {}
+  // Meshes that `known` has are taken from there; it outlives this.
+  MeshFiles(dfm_context *context, const Definition &def, const MeshFiles *known = nullptr)
+      : context_(context), def_(def), known_(known) {}
   ~MeshFiles();
   MeshFiles(const MeshFiles &) = delete;
 
   std::string path_of(const std::string &path) const;  // relative to the scene file
-  // Cells, surface and groups of a body, scaled. Borrows from this object. `warn`: of what a world then has.
+  // Cells, surface and groups of a body, scaled. Borrows from this object. `warn`: tells what was made of its
+  // file.
   BodyMesh load(const Body &body, bool warn = false);
   const dfm_type &model(const Body &body);  // that it names, or that of its cells
   // Triangles of an obstacle of shape mesh or voxels into its def. `points` takes those that are scaled; the
@@ -34,9 +37,14 @@ class MeshFiles {
   // The mesh of this key, made by the first call.
   template <class Make>
   dfm_mesh_handle once(const std::string &key, const std::string &pointer, Make &&make) {
+    if (known_ && known_->has(key)) return known_->meshes_.at(key);
     dfm_mesh_handle &mesh = meshes_[key];
     if (!mesh) def_.require(make(&mesh), pointer);
     return mesh;
+  }
+  bool has(const std::string &key) const {
+    const auto at = meshes_.find(key);
+    return at != meshes_.end() && at->second;
   }
   dfm_mesh_info info_of(dfm_mesh_handle mesh, const std::string &pointer) const;
   // reads the file; else it has a surface alone
@@ -57,6 +65,7 @@ class MeshFiles {
 
   dfm_context *context_;
   const Definition &def_;
+  const MeshFiles *known_;
   std::set<std::string> surface_only_;
   std::map<std::string, dfm_mesh_handle> meshes_;  // by what is made, and its file or name
   std::deque<Triangles> split_;                    // by body, lent to its BodyMesh

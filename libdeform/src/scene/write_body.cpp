@@ -121,7 +121,8 @@ void write_model(SceneWriter &to, const Body &b, Written &out) {
     given.push_back({row.key, &now[at], row.width});
   }
   write_choice(type, given, out["model"]);
-  // Where a rule leaves an integrator to the library, so does the body, and the rule names the others.
+  // Where a choice of the rule leaves its integrator open, so does the body, and the rule names those of its
+  // other choices.
   const auto open = [](const SwitchRule &r) {
     const auto automatic = [](const ModelChoice &c) {
       return !c.type.empty() && c.integrator == uint32_t{DFM_INTEGRATOR_AUTO};

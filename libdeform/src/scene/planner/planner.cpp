@@ -134,7 +134,7 @@ bool explicit_alone(const Body &b) { return b.device == "gpu" || b.def.mass_scal
 class Reader {
  public:
   Reader(dfm_context *context, const Definition &def, MeshFiles &files)
-      : context_(context), def_(def), types_(context->registry), files_(files), tried_(context, def) {
+      : context_(context), def_(def), types_(context->registry), files_(files), tried_(context, def, &files) {
     const auto &keys = def.gravity_keys;
     Vec3 most = load3(def.world.gravity);
     for (const double t : turns_of(keys))
@@ -567,7 +567,7 @@ class Reader {
   const Definition &def_;
   const Registry &types_;
   MeshFiles &files_;
-  MeshFiles tried_;                  // lattices, of which the scene takes at most one for each body
+  MeshFiles tried_;                  // lattices that are compared; the scene makes those that it takes
   double g_ = 0, down_[3] = {};      // the greatest gravity in the run
   std::vector<Obstacle> obstacles_;  // as they begin, those of tools last
   // by body
