@@ -1,5 +1,6 @@
 # Flags that every target of ours is built with. The number rules of the house (same bits for every vector
-# width and compiler) need -ffp-contract=off and no fast-math; kernels get their wide flags per file, see
+# width and compiler) need -ffp-contract=off and no fast-math, and a square root that is the processor's
+# instruction: mingw's sqrt(), which sets errno, rounds twice. Kernels get their wide flags per file, see
 # deform_kernel_flags.
 set(CMAKE_CXX_STANDARD 20)
 set(CMAKE_CXX_STANDARD_REQUIRED ON)
@@ -35,7 +36,8 @@ set(DFM_ABI_DIR plugins-${deform_abi})
 set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${deform_plugin_header})
 
 add_library(deform_flags INTERFACE)
-target_compile_options(deform_flags INTERFACE -ffp-contract=off -Wall -Wextra -Wno-unused-parameter)
+target_compile_options(deform_flags INTERFACE -ffp-contract=off -fno-math-errno -Wall -Wextra
+  -Wno-unused-parameter)
 # Where files are compiled together, a local name may be another file's own.
 target_compile_options(deform_flags INTERFACE $<$<NOT:$<BOOL:$<TARGET_PROPERTY:UNITY_BUILD>>>:-Wshadow>)
 if(DEFORM_WERROR)

@@ -21,7 +21,7 @@ function(deform_plugin_rules name)
   else()
     target_link_libraries(${name} PRIVATE deform::deform_headers)
   endif()
-  target_compile_options(${name} PRIVATE -ffp-contract=off)
+  target_compile_options(${name} PRIVATE -ffp-contract=off -fno-math-errno)
   target_link_libraries(${name} PRIVATE m)   # sqrt of a law in C; a host need not have it
   set_target_properties(${name} PROPERTIES C_VISIBILITY_PRESET hidden CXX_VISIBILITY_PRESET hidden
     VISIBILITY_INLINES_HIDDEN ON)
