@@ -238,8 +238,10 @@ class Runner {
       out.push_back("hold.creep_max_um_per_s is null: no pair sticks throughout the last half of the run");
     const dfm_world_stats stats = world_stats(scene_);
     if (trouble_ & DFM_TROUBLE_SUBSTEPS)
-      out.push_back("steps were cut into up to " + std::to_string(stats.substeps_max) +
-                    " sub-steps: the step is longer than the stable one; deform explain says why");
+      out.push_back(
+          "steps were cut into up to " + std::to_string(stats.substeps_max) +
+          " sub-steps: the step is longer than the stable one (deform explain says why), or too long "
+          "for bodies that meet fast");
     if (stats.cheapened > 0)
       out.push_back(std::to_string(stats.cheapened) +
                     " steps came near their limit of work or time (max_work, max_time), so some refinements "

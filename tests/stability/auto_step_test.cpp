@@ -38,3 +38,40 @@ TEST(AutoStep, ThesisCylinderThatSpins_KeepsItsEnergy) {
   const std::string mesh = test::mesh_dir() + "/thesis/cyl_coarse.msh";
   keeps({"cyl_coarse", mesh, "spin", 1}, 8000);
 }
+
+// A body that goes with its floor does so in whole steps, however fast.
+TEST(Substeps, WhatIsNear_ComesNearerByNoMoreThanAnEdge) {
+  constexpr double kStep = 1.0 / 60, kFall = 6;
+  for (const char *model : {"shape_matching", "modal"}) {
+    test::Context context;
+    const dfm_world w = test::make_world(context);
+    test::set_friction(w, 0.8);
+    dfm_obstacle_def d = dfm_obstacle_def_default();
+    d.shape = DFM_SHAPE_BOX;
+    std::fill_n(d.half_size, 3, 1.0);
+    d.pose.position[2] = -1;
+    dfm_obstacle floor = 0;
+    test::ok(dfm_obstacle_create(w, &d, &floor));
+    test::BodyOptions o;
+    o.model = model;
+    o.position = {0, 0, 0.2};
+    const dfm_body body = test::make_body(context, w, "beam", {0.1, 0.1, 0.1}, 60, o);
+    test::set_velocity(body, {0, 0, -kFall});
+    uint32_t most = 0;
+    for (int k = 0; k < 90; ++k) {
+      test::ok(dfm_world_step(w, kStep, nullptr));
+      most = std::max(most, test::stats(w).last_substeps);
+    }
+    EXPECT_GE(most, 2u) << model;
+    EXPECT_LE(most, uint32_t(std::ceil(kFall * kStep / 0.02))) << model;
+    EXPECT_EQ(test::stats(w).last_substeps, 1u) << model;
+    for (int k = 1; k <= 120; ++k) {  // to 6 m/s at 4 m/s2, then on
+      const double t = k * kStep, ramp = std::min(t, 1.5);
+      d.pose.position[0] = 2 * ramp * ramp + 6 * (t - ramp);
+      test::ok(dfm_obstacle_move_to(floor, &d.pose));
+      test::ok(dfm_world_step(w, kStep, nullptr));
+      EXPECT_EQ(test::stats(w).last_substeps, 1u) << model << ", step " << k;
+    }
+    EXPECT_NEAR(test::measure(body).velocity[0], 6, 0.1) << model;
+  }
+}

@@ -121,10 +121,10 @@ double damping_of_change(double was, double is, double stable, double since) {
 
 }  // namespace
 
-double choose_substeps(StepSizes &s, double dt, double stable) {
+double choose_substeps(StepSizes &s, double dt, double stable, double longest) {
   const StepSizes before = s;
   update_offer(s.offer, stable);
-  if (std::isinf(stable)) return 1;
+  if (std::isinf(stable)) return substeps_of(dt, longest);
   double most = s.steady < kSteady ? kVarying * stable : stable;
   update_cut(s.cut, dt, most);
   if (changed_by_host(before, s, most)) {

@@ -11,6 +11,7 @@
 //     that doubles each time;
 //   - a host that changes the length of its steps pays with damping: doc/decisions/energy_watch.md.
 #pragma once
+#include <cmath>
 #include <cstdint>
 #include <string>
 
@@ -48,8 +49,9 @@ double offered_step(const StepSizes &s, double stable);
 // The same for implicit bodies, whose step has no stability bound: by the error of the last one. It may
 // change often.
 double accurate_step(const StepSizes &s);
-// number of sub-steps of the step dt, which may be too many for an integer
-double choose_substeps(StepSizes &s, double dt, double stable);
+// Number of sub-steps of the step dt, which may be too many for an integer. longest: s, of a sub-step where
+// nothing bounds it.
+double choose_substeps(StepSizes &s, double dt, double stable, double longest = HUGE_VAL);
 // The impulse of stiffness damping c (s2: v -= c M^-1 K v) to be done after a sub-step of h; it counts as
 // done.
 double next_damping(StepSizes &s, double h, double stable);
