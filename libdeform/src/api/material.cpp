@@ -25,14 +25,6 @@ constexpr const char *kMembers[] = {"density", "young", "poisson", "damping_mass
 
 }  // namespace
 
-void dfm_material_def_default_sized(uint32_t size, dfm_material_def *out) {
-  dfm_material_def d{};
-  d.density = 1000;
-  d.young = 1e5;
-  d.poisson = 0.3;
-  write_default(size, out, d);
-}
-
 dfm_status dfm_material_create(dfm_world world, const dfm_material_def *def, dfm_material *out) {
   return as_status(to_change<world_of>, world, [&](World &w) {
     need(out, "out");

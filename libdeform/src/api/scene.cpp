@@ -114,12 +114,6 @@ dfm_status dfm_scene_probe(dfm_scene scene, uint32_t probe, const char **name, d
   });
 }
 
-void dfm_scene_write_def_default_sized(uint32_t size, dfm_scene_write_def *out) {
-  dfm_scene_write_def d{};
-  d.duration = 1;
-  write_default(size, out, d);
-}
-
 namespace {
 
 // call: name of the function, for its errors; beside: data of the scene that are not part of the world.
