@@ -555,10 +555,9 @@ class Builder {
     ProbePoint probe;
     probe.name = p.name;
     probe.body = body;
-    locate_near(p.point, p.pointer, p.body, mesh, probe.points, probe.weights);
-    probe.npoint = mesh.info.npoint;
-    probe.ntet = mesh.info.ntet;
-    while (!std::equal(probe.points, probe.points + 4, mesh.info.tets + 4 * size_t(probe.cell))) ++probe.cell;
+    uint32_t points[4];
+    locate_near(p.point, p.pointer, p.body, mesh, points, probe.weights);
+    while (!std::equal(points, points + 4, mesh.info.tets + 4 * size_t(probe.cell))) ++probe.cell;
     // Probes are reported in the scene's order, whatever the order of their bodies.
     if (probes_.size() < def_.probes.size()) probes_.resize(def_.probes.size());
     probes_[size_t(&p - def_.probes.data())] = std::move(probe);
