@@ -162,6 +162,14 @@ void check_fresh(const Node &name, const std::string &value, const std::vector<s
     name.fail("the name \"%s\" is taken by another %s; names are unique", value.c_str(), what);
 }
 
+void check_keys_of(const Node &node, const std::vector<KeyOf> &keys, const char *what,
+                   const std::string &word) {
+  for (const auto &[key, words] : keys)
+    if (node.has(key) && !listed(words, word))
+      node.member(key).fail("%s %s has no \"%s\"; that is for %s", what, word.c_str(), key,
+                            join(words).c_str());
+}
+
 void check_rising(const Node &key, double previous, double t) {
   if (!(t > previous)) key.at("t").fail("times of keyframes must increase; found %g after %g", t, previous);
 }
