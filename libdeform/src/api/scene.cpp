@@ -33,19 +33,18 @@ void close_scene(dfm_scene handle) {
   delete scene;
 }
 
-void check_call(const dfm_context *context, const char *path, const void *out) {
-  if (!context) fail(DFM_E_ARG, "dfm_scene: context is NULL; create one with dfm_context_create");
+void check_call(const char *path, const void *out) {
   if (!path || !*path)
     fail(DFM_E_ARG, "dfm_scene: path is %s; expected a scene file", path ? "empty" : "NULL");
-  if (!out) fail(DFM_E_ARG, "dfm_scene: out is NULL");
+  need(out, "out");
 }
 
 }  // namespace
 
 dfm_status dfm_scene_load(dfm_context *context, const char *path, dfm_world *out) {
   return as_status([&] {
-    check_call(context, path, out);
-    used(*context);
+    check_call(path, out);
+    used(require(context));
     *out = Scene(context, path, nullptr).release_world();
   });
 }
@@ -53,8 +52,8 @@ dfm_status dfm_scene_load(dfm_context *context, const char *path, dfm_world *out
 dfm_status dfm_scene_open(dfm_context *context, const char *path, const dfm_scene_options *options,
                           dfm_scene *out) {
   return as_status([&] {
-    check_call(context, path, out);
-    used(*context);
+    check_call(path, out);
+    used(require(context));
     const dfm_scene_options given = take_def(options, dfm_scene_options{});
     auto scene = std::make_unique<Scene>(context, path, &given);
     *out = keep_live(*context, Kind::scene, std::move(scene), [](uint64_t h) { dfm_scene_close(h); });
@@ -67,7 +66,7 @@ dfm_status dfm_scene_close(dfm_scene scene) {
 
 dfm_status dfm_scene_world(dfm_scene scene, dfm_world *out) {
   return as_status([&] {
-    if (!out) fail(DFM_E_ARG, "dfm_scene_world: out is NULL");
+    need(out, "out");
     *out = scene_of(scene).world();
   });
 }
