@@ -97,7 +97,7 @@ TEST(SceneErrors, UnknownKeys_NameTheNearest) {
          {"/contact/friction/0/params/mu_X=1", {"/contact/friction/0/params/mu_X", "mu_"}},
          {"/obstacles/0/radius=1", {"/obstacles/0/radius", "the shape plane has no \"radius\""}},
          {R"(/bodies/0/mesh={"make":"tube","inner":0.1,"radius":0.2,"length":1,"size":[1,1,1],"cells":100})",
-          {"/bodies/0/mesh/size", "a tube has no \"size\"; its size is given by radius, inner, length"}}});
+          {"/bodies/0/mesh/size", "a tube has no \"size\"; that is for beam, bricks"}}});
 }
 
 TEST(SceneErrors, StepThatNeedsTooManySubSteps_IsRefusedBeforeTheRun) {

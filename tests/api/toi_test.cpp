@@ -68,7 +68,7 @@ TEST(ToiApi, Miss_IsInfinityAndLeavesWeightsAlone) {
 }
 
 TEST(ToiApi, BadArguments_AreRefusedAndNothingIsWritten) {
-  expect_refused({4, 0, 0, 0, 0}, "options.size");
+  expect_refused({4, 0, 0, 0, 0}, "size is 4");
   expect_refused({sizeof(dfm_toi_options), 4, 0, 0, 0}, "options.method is 4");
   expect_refused({sizeof(dfm_toi_options), -1, 0, 0, 0}, "options.method is -1");
   expect_refused({sizeof(dfm_toi_options), 0, -1, 0, 0}, "options.tolerance");

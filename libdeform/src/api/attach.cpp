@@ -5,8 +5,6 @@
 
 using namespace dfm;
 
-void dfm_attach_def_default_sized(uint32_t size, dfm_attach_def *out) { write_default(size, out, {}); }
-
 dfm_status dfm_body_attach(dfm_body body, const dfm_attach_def *def, uint32_t *attachment) {
   return as_status(to_change<body_of>, body, [&](Body &b) {
     need(def, "def");

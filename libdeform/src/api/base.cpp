@@ -80,15 +80,9 @@ dfm_status dfm_file_write(const char *path, const void *bytes, size_t n) {
   });
 }
 
-void dfm_context_def_default_sized(uint32_t size, dfm_context_def *out) {
-  dfm_context_def def{};
-  def.threads = 1;
-  write_default(size, out, def);
-}
-
 dfm_status dfm_context_create(const dfm_context_def *def, dfm_context **out) {
   return as_status([&] {
-    if (!out) fail(DFM_E_ARG, "dfm_context_create: out is NULL");
+    need(out, "out");
     auto context = std::make_unique<dfm_context>(checked(def));
     context->loader.add_bundled();
     if (context->hooks.plugin_dir) {

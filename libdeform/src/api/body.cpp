@@ -119,13 +119,6 @@ Spring make_spring(const Body &b, const dfm_spring_def &d) {
 
 }  // namespace
 
-void dfm_body_def_default_sized(uint32_t size, dfm_body_def *out) {
-  dfm_body_def d{};
-  d.category = 1;
-  d.collides_with = ~0u;
-  write_default(size, out, d);
-}
-
 dfm_status dfm_body_create(dfm_world world, const dfm_body_def *def, dfm_body *out) {
   return as_status(to_change<world_of>, world, [&](World &w) {
     need(out, "out");

@@ -59,12 +59,6 @@ SeparateRule rule_of(const Body &b, const dfm_separate_def *def) {
 
 }  // namespace
 
-void dfm_cut_def_default_sized(uint32_t size, dfm_cut_def *out) {
-  dfm_cut_def d{};
-  d.pose.rotation[3] = 1;
-  write_default(size, out, d);
-}
-
 dfm_status dfm_body_cut(dfm_body body, const dfm_cut_def *def, dfm_cut_info *out) {
   return as_status(to_change<body_of>, body, [&](Body &b) {
     need(def, "def");
@@ -115,12 +109,6 @@ dfm_status dfm_body_origins(dfm_body body, uint32_t capacity_points, uint32_t *p
     for (uint32_t i = 0; copy_points && i < b.p.n; ++i) points[i] = b.cut.whole ? b.cut.point[i] : i;
     for (uint32_t c = 0; copy_cells && c < ntet; ++c) cells[c] = b.cut.whole ? b.cut.cell[c] : c;
   });
-}
-
-void dfm_separate_def_default_sized(uint32_t size, dfm_separate_def *out) {
-  dfm_separate_def d{};
-  d.least_cells = 1;
-  write_default(size, out, d);
 }
 
 dfm_status dfm_body_separate(dfm_body body, const dfm_separate_def *def, dfm_cut_info *out) {

@@ -264,7 +264,7 @@ dfm_status dfm_law_close(dfm_law law) {
 
 dfm_status dfm_law_type(dfm_law law, const dfm_type **out) {
   return as_status([&] {
-    if (!out) fail(DFM_E_ARG, "dfm_law_type: out is NULL");
+    need(out, "out");
     *out = &law_at(law).type;
   });
 }

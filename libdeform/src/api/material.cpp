@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <string_view>
 
 #include "api/objects.h"
 #include "world/body_zones.h"
@@ -20,18 +19,7 @@ constexpr struct {
                 {kTearKey, "", "strain, positive and finite", false},
                 {kToughnessKey, " J/m2", "value, zero or positive, and finite", true}};
 
-// What the def has members for.
-constexpr const char *kMembers[] = {"density", "young", "poisson", "damping_mass", "damping_stiffness"};
-
 }  // namespace
-
-void dfm_material_def_default_sized(uint32_t size, dfm_material_def *out) {
-  dfm_material_def d{};
-  d.density = 1000;
-  d.young = 1e5;
-  d.poisson = 0.3;
-  write_default(size, out, d);
-}
 
 dfm_status dfm_material_create(dfm_world world, const dfm_material_def *def, dfm_material *out) {
   return as_status(to_change<world_of>, world, [&](World &w) {
@@ -67,7 +55,8 @@ dfm_status dfm_material_create(dfm_world world, const dfm_material_def *def, dfm
       const dfm_param_value &v = m->def.extra.values[i];
       if (!v.key || !v.value)
         fail(DFM_E_ARG, "material '%s': extra entry %u has no %s", name, i, v.key ? "value" : "key");
-      if (std::ranges::count(kMembers, std::string_view(v.key)) || std::ranges::count(m->extra_keys, v.key))
+      if (is_material_member(v.key) || !std::strcmp(v.key, "density") ||
+          std::ranges::count(m->extra_keys, v.key))
         fail(DFM_E_ARG, "material '%s': extra entry %u gives '%s' a second time", name, i, v.key);
       for (const auto &[key, unit, must, zero] : kEntries)
         if (!std::strcmp(v.key, key) &&

@@ -91,24 +91,6 @@ dfm_status dfm_body_set_switches(dfm_body body, uint32_t n, const dfm_switch *sw
   });
 }
 
-void dfm_switch_default_sized(uint32_t size, dfm_switch *out) {
-  dfm_switch s{};
-  s.integrator = DFM_INTEGRATOR_AUTO;
-  s.params.size = sizeof s.params;
-  write_default(size, out, s);
-}
-
-void dfm_switch_rule_default_sized(uint32_t size, dfm_switch_rule *out) {
-  dfm_switch_rule r{};
-  for (dfm_model_choice *c : {&r.touching, &r.near_by, &r.otherwise}) {
-    c->size = sizeof *c;
-    c->params.size = sizeof c->params;
-  }
-  r.hysteresis = 0.1;
-  r.wait = 0.1;
-  write_default(size, out, r);
-}
-
 dfm_status dfm_body_set_switch_rule(dfm_body body, const dfm_switch_rule *rule) {
   return as_status(to_change<body_of>, body, [&](Body &b) {
     std::vector<SwitchRule> made;

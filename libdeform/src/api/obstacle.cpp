@@ -11,16 +11,6 @@
 
 using namespace dfm;
 
-void dfm_obstacle_def_default_sized(uint32_t size, dfm_obstacle_def *out) {
-  dfm_obstacle_def d{};
-  d.half_size[0] = d.half_size[1] = d.half_size[2] = 0.5;
-  d.radius = 0.5;
-  d.half_length = 0.5;
-  d.category = 1;
-  d.collides_with = ~0u;
-  write_default(size, out, d);
-}
-
 dfm_status dfm_obstacle_create(dfm_world world, const dfm_obstacle_def *def, dfm_obstacle *out) {
   return as_status(to_change<world_of>, world, [&](World &w) {
     need(out, "out");

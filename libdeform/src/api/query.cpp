@@ -7,19 +7,6 @@
 
 using namespace dfm;
 
-void dfm_query_shape_default_sized(uint32_t size, dfm_query_shape *out) {
-  dfm_query_shape d{};
-  d.shape = DFM_SHAPE_SPHERE;
-  write_default(size, out, d);
-}
-
-void dfm_query_filter_default_sized(uint32_t size, dfm_query_filter *out) {
-  dfm_query_filter d{};
-  d.what = DFM_QUERY_BODIES | DFM_QUERY_OBSTACLES | DFM_QUERY_RIGIDS;
-  d.category = d.collides_with = ~0u;
-  write_default(size, out, d);
-}
-
 namespace {
 
 // The filter of a call, in the full size of this library.

@@ -44,18 +44,6 @@ dfm_status dfm_rigid_host_register(const char *name, const dfm_rigid_host *table
   });
 }
 
-void dfm_rigid_def_default_sized(uint32_t size, dfm_rigid_def *out) {
-  dfm_rigid_def d{};
-  d.shape = 1;  // DFM_SHAPE_SPHERE
-  d.half_size[0] = d.half_size[1] = d.half_size[2] = 0.5;
-  d.radius = 0.5;
-  d.half_length = 0.5;
-  d.mass = 1;
-  d.category = 1;
-  d.collides_with = ~0u;
-  write_default(size, out, d);
-}
-
 dfm_status dfm_rigid_create(dfm_world world, const char *host, const dfm_rigid_set_def *set, dfm_rigid *out) {
   return as_status(to_change<world_of>, world, [&](World &w) {
     need(set, "set");

@@ -33,19 +33,18 @@ void close_scene(dfm_scene handle) {
   delete scene;
 }
 
-void check_call(const dfm_context *context, const char *path, const void *out) {
-  if (!context) fail(DFM_E_ARG, "dfm_scene: context is NULL; create one with dfm_context_create");
+void check_call(const char *path, const void *out) {
   if (!path || !*path)
     fail(DFM_E_ARG, "dfm_scene: path is %s; expected a scene file", path ? "empty" : "NULL");
-  if (!out) fail(DFM_E_ARG, "dfm_scene: out is NULL");
+  need(out, "out");
 }
 
 }  // namespace
 
 dfm_status dfm_scene_load(dfm_context *context, const char *path, dfm_world *out) {
   return as_status([&] {
-    check_call(context, path, out);
-    used(*context);
+    check_call(path, out);
+    used(require(context));
     *out = Scene(context, path, nullptr).release_world();
   });
 }
@@ -53,8 +52,8 @@ dfm_status dfm_scene_load(dfm_context *context, const char *path, dfm_world *out
 dfm_status dfm_scene_open(dfm_context *context, const char *path, const dfm_scene_options *options,
                           dfm_scene *out) {
   return as_status([&] {
-    check_call(context, path, out);
-    used(*context);
+    check_call(path, out);
+    used(require(context));
     const dfm_scene_options given = take_def(options, dfm_scene_options{});
     auto scene = std::make_unique<Scene>(context, path, &given);
     *out = keep_live(*context, Kind::scene, std::move(scene), [](uint64_t h) { dfm_scene_close(h); });
@@ -67,7 +66,7 @@ dfm_status dfm_scene_close(dfm_scene scene) {
 
 dfm_status dfm_scene_world(dfm_scene scene, dfm_world *out) {
   return as_status([&] {
-    if (!out) fail(DFM_E_ARG, "dfm_scene_world: out is NULL");
+    need(out, "out");
     *out = scene_of(scene).world();
   });
 }
@@ -106,18 +105,16 @@ dfm_status dfm_scene_probe(dfm_scene scene, uint32_t probe, const char **name, d
   return as_status(scene_of, scene, [&](Scene &s) {
     if (probe >= s.probe_count())
       fail(DFM_E_ARG, "dfm_scene_probe: there is no probe %u, the scene has %zu", probe, s.probe_count());
+    const scene::ProbePoint &p = s.probe(probe);
+    if (!handle_find(Kind::body, p.body))
+      fail(DFM_E_HANDLE, "probe \"%s\": its body was destroyed", p.name.c_str());
+    not_in_step(any_body_of(p.body));
     double x[3], v[3];
     s.probe_state(probe, x, v);
-    if (name) *name = s.probe(probe).name.c_str();
+    if (name) *name = p.name.c_str();
     if (position) std::memcpy(position, x, sizeof x);
     if (velocity) std::memcpy(velocity, v, sizeof v);
   });
-}
-
-void dfm_scene_write_def_default_sized(uint32_t size, dfm_scene_write_def *out) {
-  dfm_scene_write_def d{};
-  d.duration = 1;
-  write_default(size, out, d);
 }
 
 namespace {
@@ -164,6 +161,7 @@ dfm_status dfm_world_write_scene(dfm_world world, const char *path, const dfm_sc
 dfm_status dfm_scene_write(dfm_scene scene, const char *path, const dfm_scene_write_def *def,
                            uint32_t *notes) {
   return as_status(scene_of, scene, [&](const Scene &s) {
+    World &w = exclusive(world_of(s.world()));
     const scene::Definition &has = s.definition();
     dfm_scene_write_def usual = dfm_scene_write_def_default();
     usual.duration = has.duration;
@@ -172,13 +170,13 @@ dfm_status dfm_scene_write(dfm_scene scene, const char *path, const dfm_scene_wr
     writing::Beside beside;
     if (!has.probes.empty()) beside.probes = s.value("/probes");
     for (size_t i = 0; i < s.probe_count(); ++i) {
-      uint32_t points[4];
+      const uint32_t *points;
       const bool there = handle_find(Kind::body, s.probe(i).body);
-      const dfm_body body = there ? s.probe_body(i, points) : 0;
-      beside.probe_bodies.push_back(body ? shown_body_of(body).name : "");
+      const Body *const body = there ? s.probe_body(i, points) : nullptr;
+      beside.probe_bodies.push_back(body ? body->name : "");
     }
     beside.output = s.value("/output");
     beside.equilibrium = has.equilibrium;
-    write_scene("dfm_scene_write", exclusive(world_of(s.world())), path, d, std::move(beside), notes);
+    write_scene("dfm_scene_write", w, path, d, std::move(beside), notes);
   });
 }

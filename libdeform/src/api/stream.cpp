@@ -17,12 +17,6 @@ using namespace dfm;
 
 static_assert(std::endian::native == std::endian::little);
 
-void dfm_stream_def_default_sized(uint32_t size, dfm_stream_def *out) {
-  dfm_stream_def d{};
-  d.kind = DFM_STREAM_FRAME;
-  write_default(size, out, d);
-}
-
 namespace {
 
 constexpr uint32_t kHeader = 32, kChunk = 8, kSurfaceHead = 20, kPackedHead = 48, kRangeHead = 16;  // bytes

@@ -3,8 +3,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "api/as_status.h"
-#include "api/structs.h"
+#include "api/objects.h"
 #include "ccd/toi.h"
 
 namespace dfm {
@@ -13,15 +12,9 @@ namespace {
 thread_local uint32_t last_evaluations = 0;
 
 dfm_toi_options checked(const char *function, const dfm_toi_options *given) {
-  dfm_toi_options o{};
-  o.method = DFM_TOI_CONSERVATIVE;
-  if (!given) return o;
-  const uint32_t least = offsetof(dfm_toi_options, tolerance);
-  if (given->size < least || given->size > kMaxDef)
-    fail(DFM_E_ARG, "%s: options.size is %u, at least %u expected; set it to sizeof", function, given->size,
-         least);
-  refuse_unknown(given);
-  std::memcpy(&o, given, std::min<size_t>(given->size, sizeof o));
+  dfm_toi_options usual{};
+  usual.method = DFM_TOI_CONSERVATIVE;
+  const dfm_toi_options o = take_def(given, usual);
   if (o.method < DFM_TOI_BISECTION || o.method > DFM_TOI_CONSERVATIVE)
     fail(DFM_E_ARG, "%s: options.method is %d, expected DFM_TOI_BISECTION (0) to DFM_TOI_CONSERVATIVE (3)",
          function, o.method);
@@ -65,7 +58,7 @@ dfm_status dfm_toi_point_triangle(const dfm_motion *p, const dfm_motion tri[3],
     const dfm_toi_options o = checked(name, options);
     check(name, "p", p, 1);
     check(name, "tri", tri, 3);
-    if (!t) fail(DFM_E_ARG, "%s: t is NULL", name);
+    need(t, "t");
     copy_out(dfm::toi_point_triangle(*p, tri, o), t, bary, 3);
   });
 }
@@ -77,7 +70,7 @@ dfm_status dfm_toi_edge_edge(const dfm_motion a[2], const dfm_motion b[2], const
     const dfm_toi_options o = checked(name, options);
     check(name, "a", a, 2);
     check(name, "b", b, 2);
-    if (!t) fail(DFM_E_ARG, "%s: t is NULL", name);
+    need(t, "t");
     copy_out(dfm::toi_edge_edge(a, b, o), t, ab, 2);
   });
 }

@@ -15,16 +15,6 @@ Tool &tool_of(dfm_tool h) { return part_of<Tool>(Kind::tool, h); }
 
 }  // namespace
 
-void dfm_tool_def_default_sized(uint32_t size, dfm_tool_def *out) {
-  dfm_tool_def d{};
-  d.radius = 0.005;
-  d.mass = 0.05;
-  d.inertia = 1e-5;
-  d.category = 1;
-  d.collides_with = ~0u;
-  write_default(size, out, d);
-}
-
 dfm_status dfm_tool_create(dfm_world world, const dfm_tool_def *def, dfm_tool *out) {
   return as_status(to_change<world_of>, world, [&](World &w) {
     need(def, "def");

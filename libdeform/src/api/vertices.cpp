@@ -11,14 +11,6 @@
 
 using namespace dfm;
 
-void dfm_vertex_layout_default_sized(uint32_t size, dfm_vertex_layout *out) {
-  dfm_vertex_layout d{};
-  d.stride = 24;
-  d.normal = 12;
-  d.velocity = d.displacement = d.stick = DFM_VERTEX_NONE;
-  write_default(size, out, d);
-}
-
 namespace {
 
 struct Member {

@@ -118,18 +118,6 @@ void select_effects(World &w) {
 
 }  // namespace
 
-void dfm_world_def_default_sized(uint32_t size, dfm_world_def *out) {
-  dfm_world_def d{};
-  d.gravity[2] = -9.81;
-  d.max_sweeps = 200;
-  d.max_passes = 20;
-  d.max_substeps = 10000;
-  d.sleep_speed = 0.01;
-  d.sleep_time = 0.5;
-  d.energy_watch = 0.01;
-  write_default(size, out, d);
-}
-
 dfm_status dfm_world_create(dfm_context *context, const dfm_world_def *def, dfm_world *out) {
   return as_status([&] {
     need(context, "context");
@@ -243,13 +231,6 @@ dfm_status dfm_world_step(dfm_world world, double dt, uint32_t *trouble) {
     if (s == DFM_OK) write_devices(w);
     return s;
   });
-}
-
-void dfm_equilibrium_def_default_sized(uint32_t size, dfm_equilibrium_def *out) {
-  dfm_equilibrium_def d{};
-  d.load_steps = 1;
-  d.load_to = 1;
-  write_default(size, out, d);
 }
 
 dfm_status dfm_world_equilibrium(dfm_world world, const dfm_equilibrium_def *def,

@@ -14,7 +14,6 @@
 #include "deform/plugin.h"
 #include "geometry/closest.h"
 #include "geometry/rest_tree.h"
-#include "math/extent.h"
 #include "mesh/cells.h"
 
 namespace dfm {
@@ -50,17 +49,13 @@ double cell_distance2(Vec3 x, const Vec3 c[4]) {
   return best;
 }
 
-Array<RestBox> cell_boxes(const Memory &memory, const CouplingInput &in, const LocalRest &rest) {
-  Array<RestBox> boxes(in.ntet, RestBox{}, memory);
-  for (uint32_t t = 0; t < in.ntet; ++t) {
-    Extent box;
-    for (size_t k = 0; k < 4; ++k) box.add(rest.point[in.tet[size_t{4} * t + k]]);
-    // points accepted by kInside may be outside by that share of the cell
-    const double more = 4 * kInside * box.longest();
-    box.grow({more, more, more});
-    boxes[t] = {box.lo, box.hi};
-  }
-  return boxes;
+Extent cell_box(const CouplingInput &in, const LocalRest &rest, uint32_t tet) {
+  Extent box;
+  for (size_t k = 0; k < 4; ++k) box.add(rest.point[in.tet[size_t{4} * tet + k]]);
+  // points accepted by kInside may be outside by that share of the cell
+  const double more = 4 * kInside * box.longest();
+  box.grow({more, more, more});
+  return box;
 }
 
 // Barycentric coordinates of x in the tetrahedron c, refined once so that sum w c = x to rounding in cells of
@@ -120,7 +115,7 @@ void add_up(Array<RowEntry> &row) {
 class RestCells {
  public:
   RestCells(const Memory &memory, const CouplingInput &in, const LocalRest &rest)
-      : in_(in), rest_(rest), box_(cell_boxes(memory, in, rest)), tree_(memory, box_) {}
+      : in_(in), rest_(rest), tree_(memory, in.ntet, [&](uint32_t t) { return cell_box(in, rest, t); }) {}
   // The lowest cell that contains x (away 0), else the nearest one (away: its distance, m).
   uint32_t find(Vec3 x, double &away) const;
   // Appends the row of a surfel at x, from the cell that find() gives; returns away.
@@ -132,7 +127,6 @@ class RestCells {
 
   const CouplingInput &in_;
   const LocalRest &rest_;
-  Array<RestBox> box_;
   RestTree tree_;
 };
 
@@ -338,10 +332,11 @@ class Cloud {
   Cloud(const Memory &memory, const CouplingInput &in)
       : rest(memory, in),
         support(in.npoint, 0.0, memory),
-        dots_(dots(memory, rest.point)),
-        dot_tree_(memory, dots_),
-        cubes_(find_supports(memory, in.support)),
-        cube_tree_(memory, cubes_) {}
+        dots_(memory, in.npoint, [&](uint32_t i) { return Extent{rest.point[i], rest.point[i]}; }),
+        cubes_(memory, in.npoint, [&](uint32_t i) {
+          const double h = support[i] = find_support(i, in.support);
+          return Extent{rest.point[i] - Vec3{h, h, h}, rest.point[i] + Vec3{h, h, h}};
+        }) {}
 
   LocalRest rest;
   Array<double> support;  // [npoint] h_i, m
@@ -349,7 +344,7 @@ class Cloud {
   // Phyxels that reach x, ascending.
   void reaching(Vec3 x, Array<uint32_t> &out) const {
     out.clear();
-    cube_tree_.holding(x, [&](uint32_t i) {
+    cubes_.holding(x, [&](uint32_t i) {
       if (norm2(x - rest.point[i]) < support[i] * support[i]) out.push_back(i);
     });
     std::sort(out.begin(), out.end());
@@ -357,45 +352,31 @@ class Cloud {
   // Other phyxels within the support of i, ascending.
   void around(uint32_t i, Array<uint32_t> &out) const {
     const double h2 = support[i] * support[i];
-    dot_tree_.near(rest.point[i], h2, [&](uint32_t j) {
+    dots_.near(rest.point[i], h2, [&](uint32_t j) {
       if (j != i && norm2(rest.point[j] - rest.point[i]) < h2) out.push_back(j);
     });
     std::sort(out.begin(), out.end());
   }
 
  private:
-  Array<RestBox> dots_;
-  RestTree dot_tree_;
-  Array<RestBox> cubes_;
-  RestTree cube_tree_;
+  RestTree dots_;   // the phyxels
+  RestTree cubes_;  // their supports
 
-  static Array<RestBox> dots(const Memory &memory, const Array<Vec3> &x) {
-    Array<RestBox> out(memory);
-    for (const Vec3 p : x) out.push_back({p, p});
-    return out;
-  }
-  // Sets the supports; returns the cubes around them.
-  Array<RestBox> find_supports(const Memory &memory, double factor) {
-    Array<RestBox> cubes(memory);
-    for (uint32_t i = 0; i < support.size(); ++i) {
-      double nearest[kNeighbors], limit2 = std::numeric_limits<double>::infinity();
-      uint32_t n = 0;
-      dot_tree_.near(rest.point[i], limit2, [&](uint32_t j) {
-        if (j == i) return;
-        const double d2 = norm2(rest.point[j] - rest.point[i]);
-        if (n == kNeighbors && d2 >= limit2) return;
-        uint32_t at = n < kNeighbors ? n++ : kNeighbors - 1;
-        for (; at > 0 && nearest[at - 1] > d2; --at) nearest[at] = nearest[at - 1];
-        nearest[at] = d2;
-        if (n == kNeighbors) limit2 = nearest[kNeighbors - 1];
-      });
-      double sum = 0;
-      for (uint32_t k = 0; k < n; ++k) sum += std::sqrt(nearest[k]);
-      const double h = n ? factor * sum / n : 0;
-      support[i] = h;
-      cubes.push_back({rest.point[i] - Vec3{h, h, h}, rest.point[i] + Vec3{h, h, h}});
-    }
-    return cubes;
+  double find_support(uint32_t i, double factor) const {
+    double nearest[kNeighbors], limit2 = std::numeric_limits<double>::infinity();
+    uint32_t n = 0;
+    dots_.near(rest.point[i], limit2, [&](uint32_t j) {
+      if (j == i) return;
+      const double d2 = norm2(rest.point[j] - rest.point[i]);
+      if (n == kNeighbors && d2 >= limit2) return;
+      uint32_t at = n < kNeighbors ? n++ : kNeighbors - 1;
+      for (; at > 0 && nearest[at - 1] > d2; --at) nearest[at] = nearest[at - 1];
+      nearest[at] = d2;
+      if (n == kNeighbors) limit2 = nearest[kNeighbors - 1];
+    });
+    double sum = 0;
+    for (uint32_t k = 0; k < n; ++k) sum += std::sqrt(nearest[k]);
+    return n ? factor * sum / n : 0;
   }
 };
 

@@ -1,73 +1,48 @@
 // A tree of boxes over things at rest (points, cells, supports), for the construction of couplings. Built
-// once, never changed.
+// once, never changed: that of triangles (box_tree.h), each of them the diagonal of a box.
 #pragma once
-#include <algorithm>
-#include <cstdint>
-
-#include "core/memory.h"
-#include "math/vec3.h"
+#include "geometry/tree_walk.h"
+#include "math/extent.h"
 
 namespace dfm {
 
-struct RestBox { Vec3 lo, hi; };
-
-// Splits at the median along the longest extent of the box centers, items ordered by (center, number): the
-// tree depends on its input alone.
 class RestTree {
  public:
-  RestTree(const Memory &memory, const Array<RestBox> &boxes);
-
+  // box(i): the Extent of the item i < n
+  template <class F>
+  RestTree(const Memory &memory, uint32_t n, F &&box) : tree_(memory) {
+    Array<double> x{memory};
+    Array<uint32_t> corner{memory};
+    for (uint32_t i = 0; i < n; ++i) {
+      const Extent b = box(i);
+      x.insert(x.end(), {b.lo.x, b.lo.y, b.lo.z, 0, b.hi.x, b.hi.y, b.hi.z, 0});
+      corner.insert(corner.end(), {2 * i, 2 * i, 2 * i + 1});
+    }
+    tree_.build(corner, x.data());
+  }
   // Calls visit(item) for every item whose box holds p, in no promised order.
   template <class F>
   void holding(Vec3 p, F &&visit) const {
-    walk(0, [&](const RestBox &b) { return distance2(b, p) <= 0; }, visit);
+    near_triangles(tree_, [&](const Box &b) { return box_distance2(b, at(p)) <= 0; }, visit);
   }
   // Calls visit(item) for every item whose box is no further from p than sqrt(limit2); visit
   // may lower limit2.
   template <class F>
   void near(Vec3 p, const double &limit2, F &&visit) const {
-    if (!node_.empty()) near_node(0, p, limit2, visit);
+    if (tree_.empty()) return;
+    uint64_t nodes = 0;
+    const Box own = at(p);
+    nearest_first(
+        tree_, limit2, nodes, [&](const Box &b) { return box_distance2(b, own); },
+        [&](uint32_t first, uint32_t last) {
+          for (; first < last; ++first)
+            if (box_distance2(tree_.triangle_boxes()[first], own) <= limit2) visit(tree_.triangles()[first]);
+        });
   }
 
  private:
-  // items [begin,end); children: the next node and `right`; a leaf has right 0
-  struct Node {
-    RestBox box;
-    uint32_t begin, end, right;
-  };
-  static constexpr uint32_t kLeaf = 4;
-  Array<Node> node_;
-  Array<uint32_t> item_;
-  const Array<RestBox> &box_;
-
-  uint32_t build(uint32_t begin, uint32_t end);
-  static double distance2(const RestBox &b, Vec3 p) {
-    const auto outside = [](double lo, double hi, double x) { return std::max({lo - x, x - hi, 0.0}); };
-    return norm2({outside(b.lo.x, b.hi.x, p.x), outside(b.lo.y, b.hi.y, p.y), outside(b.lo.z, b.hi.z, p.z)});
-  }
-  template <class Enter, class F>
-  void walk(uint32_t n, const Enter &enter, F &visit) const {
-    if (n >= node_.size() || !enter(node_[n].box)) return;
-    if (node_[n].right) {
-      walk(n + 1, enter, visit);
-      return walk(node_[n].right, enter, visit);
-    }
-    for (uint32_t i = node_[n].begin; i < node_[n].end; ++i)
-      if (enter(box_[item_[i]])) visit(item_[i]);
-  }
-  template <class F>
-  void near_node(uint32_t n, Vec3 p, const double &limit2, F &visit) const {
-    const Node &node = node_[n];
-    if (!node.right) {
-      for (uint32_t i = node.begin; i < node.end; ++i)
-        if (distance2(box_[item_[i]], p) <= limit2) visit(item_[i]);
-      return;
-    }
-    const double left = distance2(node_[n + 1].box, p), right = distance2(node_[node.right].box, p);
-    const uint32_t first = right < left ? node.right : n + 1, second = right < left ? n + 1 : node.right;
-    if (std::min(left, right) <= limit2) near_node(first, p, limit2, visit);
-    if (std::max(left, right) <= limit2) near_node(second, p, limit2, visit);
-  }
+  static Box at(Vec3 p) { return {{p.x, p.y, p.z, 0}, {p.x, p.y, p.z, 0}}; }
+  BoxTree tree_;
 };
 
 }  // namespace dfm

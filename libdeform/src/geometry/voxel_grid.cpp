@@ -39,8 +39,12 @@ class Distances {
         origin_(low),
         scale_(1 / norm(high - low)),
         scaled_(memory),
-        boxes_(make_boxes(memory, points, ntri, tris)),
-        tree_(memory, boxes_),
+        tree_(memory, ntri,
+              [&](uint32_t t) {
+                Extent box;
+                for (size_t i = 0; i < 3; ++i) box.add(at(tris[3 * size_t{t} + i]));
+                return box;
+              }),
         winding_(memory, make_scaled(ntri), ntri, tris) {}
 
   // m, without sign. The surface is known to be no further than `most`.
@@ -56,17 +60,6 @@ class Distances {
 
  private:
   Vec3 at(uint32_t i) const { return load3(points_ + 3 * size_t{i}); }
-  static Array<RestBox> make_boxes(const Memory &memory, const double *points, uint32_t ntri,
-                                   const uint32_t *tris) {
-    Array<RestBox> boxes{memory};
-    boxes.reserve(ntri);
-    for (uint32_t t = 0; t < ntri; ++t) {
-      Extent b;
-      for (size_t i = 0; i < 3; ++i) b.add(load3(points + 3 * size_t{tris[3 * size_t{t} + i]}));
-      boxes.push_back({b.lo, b.hi});
-    }
-    return boxes;
-  }
   // The winding number is computed in a box of size one.
   const double *make_scaled(uint32_t ntri) {
     uint32_t most = 0;
@@ -81,7 +74,6 @@ class Distances {
   Vec3 origin_;
   double scale_;
   Array<double> scaled_;
-  Array<RestBox> boxes_;
   RestTree tree_;
   WindingTree winding_;
 };

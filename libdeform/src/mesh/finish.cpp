@@ -6,6 +6,8 @@
 #include <array>
 #include <cfloat>
 #include <cmath>
+#include <numeric>
+#include <tuple>
 
 #include "core/names.h"
 #include "core/path.h"
@@ -124,27 +126,6 @@ void renumber(RawMesh &raw) {
   add_to_groups(raw.groups, raw.tet_group, raw.tets);
 }
 
-// Groups by dimension and number, whatever order the file has them in.
-void sort_groups(RawMesh &raw) {
-  const uint32_t n = uint32_t(raw.groups.size());
-  std::vector<uint32_t> order(n), place(n);
-  for (uint32_t g = 0; g < n; ++g) order[g] = g;
-  std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
-    return std::pair(raw.groups[a].dimension, raw.groups[a].tag) <
-           std::pair(raw.groups[b].dimension, raw.groups[b].tag);
-  });
-  std::vector<MeshGroup> sorted;
-  sorted.reserve(n);
-  for (uint32_t g = 0; g < n; ++g) {
-    place[order[g]] = g;
-    sorted.push_back(std::move(raw.groups[order[g]]));
-  }
-  raw.groups = std::move(sorted);
-  for (uint32_t &g : raw.tet_group)
-    if (g != kNoGroup) g = place[g];
-  for (uint32_t &g : raw.tri_group) g = place[g];
-}
-
 // Shares are used only if there is one for each cell, all in (0,1]; otherwise the array means something else.
 void check_shares(RawMesh &raw) {
   const bool valid = raw.share.size() == raw.ntet() &&
@@ -227,6 +208,21 @@ void sort_once(Array<uint32_t> &points) {
   points.shrink_to_fit();
 }
 
+void keep_groups(RawMesh &raw, std::vector<uint32_t> kept) {
+  std::ranges::sort(kept, {},
+                    [&](uint32_t g) { return std::tuple(raw.groups[g].dimension, raw.groups[g].tag, g); });
+  std::vector<MeshGroup> groups;
+  std::vector<uint32_t> place(raw.groups.size(), kNoGroup);
+  for (const uint32_t g : kept) {
+    place[g] = uint32_t(groups.size());
+    groups.push_back(std::move(raw.groups[g]));
+  }
+  raw.groups = std::move(groups);
+  for (Array<uint32_t> *const of : {&raw.tet_group, &raw.tri_group})
+    for (uint32_t &g : *of)
+      if (g != kNoGroup) g = place[g];
+}
+
 void add_to_groups(std::vector<MeshGroup> &groups, const Array<uint32_t> &group,
                    const Array<uint32_t> &corners) {
   const size_t width = group.empty() ? 0 : corners.size() / group.size();
@@ -307,7 +303,9 @@ RestMesh finish_mesh(const std::string &path, RawMesh &&raw) {
     fail(DFM_E_FORMAT, "%s: cells lie on one another; write each of the %s once", path.c_str(),
          cell_kind(raw.cell).name);
   renumber(raw);
-  sort_groups(raw);
+  std::vector<uint32_t> groups(raw.groups.size());
+  std::iota(groups.begin(), groups.end(), 0u);
+  keep_groups(raw, std::move(groups));
   uint32_t crowded = 0;
   raw.overlapping = count_overlaps(raw, &crowded);
   add_warnings(raw, crowded);

@@ -33,6 +33,8 @@ void sort_once(Array<uint32_t> &points);  // points of a group: ascending, each 
 // The points of cells or triangles, of each the group, into their groups.
 void add_to_groups(std::vector<MeshGroup> &groups, const Array<uint32_t> &group,
                    const Array<uint32_t> &corners);
+// Keeps these groups, by dimension and number, whatever order the file has them in.
+void keep_groups(RawMesh &raw, std::vector<uint32_t> kept);
 // Drops cells with the same four corners as an earlier cell; returns how many. file_cell (may be null):
 // numbers of the kept cells, if any is dropped.
 uint32_t drop_duplicate_cells(RawMesh &raw, Array<uint32_t> *file_cell = nullptr);

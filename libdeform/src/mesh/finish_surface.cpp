@@ -348,25 +348,17 @@ void renumber(RawMesh &raw, uint32_t inner) {
 
 // Groups that triangles carry, by number; their points are those of the triangles, not of the
 // file's elements.
-void sort_groups(RawMesh &raw) {
-  std::vector<uint32_t> order, place(raw.groups.size(), kNoGroup);
-  for (const uint32_t g : raw.tri_group)
-    if (g != kNoGroup && place[g] == kNoGroup) {
-      place[g] = 0;
-      order.push_back(g);
-    }
-  std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
-    return std::pair(raw.groups[a].tag, a) < std::pair(raw.groups[b].tag, b);
-  });
-  std::vector<MeshGroup> groups;
-  for (const uint32_t g : order) {
-    place[g] = uint32_t(groups.size());
-    groups.push_back({raw.groups[g].name, 2, raw.groups[g].tag, Array<uint32_t>(*raw.memory)});
+void keep_used_groups(RawMesh &raw) {
+  std::vector<uint32_t> used(raw.tri_group.begin(), raw.tri_group.end());
+  std::ranges::sort(used);
+  used.erase(std::unique(used.begin(), used.end()), used.end());
+  std::erase(used, kNoGroup);
+  for (MeshGroup &group : raw.groups) {
+    group.dimension = 2;
+    use_memory(*raw.memory, group.points);
   }
-  for (uint32_t &g : raw.tri_group)
-    if (g != kNoGroup) g = place[g];
-  add_to_groups(groups, raw.tri_group, raw.tris);
-  raw.groups = std::move(groups);
+  keep_groups(raw, std::move(used));
+  add_to_groups(raw.groups, raw.tri_group, raw.tris);
 }
 
 // ---- what was done ----------------------------------------------------------------------------------------
@@ -427,7 +419,7 @@ RestMesh finish_surface(const std::string &path, RawMesh &&raw) {
          path.c_str(), given);
   raw.dropped_cells = given - count(raw);
   renumber(raw, inner);
-  sort_groups(raw);
+  keep_used_groups(raw);
   raw.turned = orient_triangles(*raw.memory, raw.points, raw.tris, &done.twisted);
   raw.cell = DFM_CELL_TET;  // as of every mesh without cells
   add_warnings(raw, done);

@@ -39,11 +39,7 @@ void check_keys(const dfm_type &type, std::span<const dfm_param_value> given) {
       fail(DFM_E_ARG, "%s: parameter %zu has no %s", type.id, i, given[i].key ? "value" : "key");
     bool known = find_row(type, given[i].key) != nullptr;
     for (uint32_t k = 0; k < type.nparam; ++k) known |= names_param(type, given[i].key, type.params[k].key);
-    if (!known) {
-      const auto keys = keys_of(type);
-      fail(DFM_E_ARG, "%s has no parameter \"%s\"%s; it has %s", type.id, given[i].key,
-           did_you_mean(given[i].key, keys).c_str(), keys.empty() ? "none" : join(keys).c_str());
-    }
+    if (!known) fail(DFM_E_ARG, "%s", no_parameter(type, "parameter", given[i].key, keys_of(type)).c_str());
     for (size_t k = 0; k < i; ++k)
       if (std::strcmp(given[i].key, given[k].key) == 0)
         fail(DFM_E_ARG, "%s: parameter \"%s\" is given twice", type.id, given[i].key);
@@ -74,6 +70,12 @@ const dfm_param_value *choose(const dfm_type &type, const dfm_param &row,
 }
 
 }  // namespace
+
+std::string no_parameter(const dfm_type &type, const char *what, const std::string &key,
+                         const std::vector<std::string> &known) {
+  return format("%s has no %s \"%s\"%s; it has: %s", type.id, what, key.c_str(),
+                did_you_mean(key, known).c_str(), known.empty() ? "none" : join(known).c_str());
+}
 
 const dfm_param *find_row(const dfm_type &type, const char *key) {
   for (uint32_t i = 0; i < type.nparam; ++i)

@@ -2,6 +2,7 @@
 #pragma once
 #include <functional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "deform/base.h"
@@ -22,6 +23,9 @@ std::vector<double> changed_params(const dfm_type &type, std::span<const dfm_par
 // Packed values by key, in the form that pack_params takes; they point into `packed`.
 std::vector<dfm_param_value> param_rows(const dfm_type &type, const std::vector<double> &packed);
 const dfm_param *find_row(const dfm_type &type, const char *key);  // of its table; null: none
-uint32_t packed_width(const dfm_type &type);                       // doubles of all rows
+// "ID has no parameter "KEY"", with the nearest of those that it has, and all of them. what: "parameter".
+std::string no_parameter(const dfm_type &type, const char *what, const std::string &key,
+                         const std::vector<std::string> &known);
+uint32_t packed_width(const dfm_type &type);  // doubles of all rows
 
 }  // namespace dfm

@@ -21,6 +21,7 @@
 #include "state/world.h"
 #include "world/equilibrium.h"
 #include "world/model_change.h"
+#include "world/queries.h"
 
 namespace dfm::scene {
 namespace {
@@ -31,39 +32,19 @@ Vec3 center(const dfm::Body &b) {
   return (1.0 / b.p.n) * sum;
 }
 
-// Whether the first triangle that a ray from `from` along `d` meets (both in the obstacle's frame) faces away
-// from its origin.
-bool meets_a_back(const dfm::Obstacle &o, Vec3 from, Vec3 d) {
-  constexpr double kEdge = 1e-9;  // a ray through a shared edge meets one of its triangles
-  double nearest = INFINITY;
-  bool back = false;
-  for (size_t t = 0; t < o.triangles.size(); t += 3) {
-    const Vec3 a = load3(&o.points[3 * size_t{o.triangles[t]}]),
-               u = load3(&o.points[3 * size_t{o.triangles[t + 1]}]) - a,
-               v = load3(&o.points[3 * size_t{o.triangles[t + 2]}]) - a, normal = cross(u, v);
-    const double along = dot(normal, d);
-    if (along == 0) continue;
-    const double at = dot(normal, a - from) / along;
-    if (!(at > 0) || at >= nearest) continue;
-    const Vec3 w = from + at * d - a;
-    const double n2 = norm2(normal), s = dot(cross(w, v), normal) / n2, r = dot(cross(u, w), normal) / n2;
-    if (s < -kEdge || r < -kEdge || s + r > 1 + kEdge) continue;
-    nearest = at;
-    back = along > 0;
-  }
-  return back;
-}
-
 // Warns once per obstacle. An open mesh acts on the side that its triangles face; a file whose triangles face
 // the other way looks the same in a picture, and a body that falls on its back sticks to it.
 void warn_back_side(dfm_context *context, const World &world, Vec3 gravity) {
   if (!(norm(gravity) > 0)) return;
   for (const auto &o : world.obstacles) {
     if (!o || !o->mesh || o->mesh->closed || o->sensor || o->rigid) continue;
-    const Quat back = conjugate(o->pose.rotation);
-    const Vec3 d = rotate(back, gravity);
+    const dfm::Triangles triangles = search(*o);
+    const Vec3 down = rotate_back(o->pose.rotation, normalized(gravity));
     for (const auto &b : world.bodies) {
-      if (!b || !meets_a_back(*o, rotate(back, center(*b) - o->pose.position), d)) continue;
+      if (!b) continue;
+      const Vec3 from = rotate_back(o->pose.rotation, center(*b) - o->pose.position);
+      const uint32_t first = first_on_ray(triangles, from, down, kFar).triangle;
+      if (first == kNone || dot(normal_of(triangles, first), down) <= 0) continue;
       context->warn(*b,
                     " would fall on the back of obstacle '%s': its mesh is open and acts only on the side "
                     "that its triangles face; reverse the order of their corners in the file",
@@ -555,10 +536,9 @@ class Builder {
     ProbePoint probe;
     probe.name = p.name;
     probe.body = body;
-    locate_near(p.point, p.pointer, p.body, mesh, probe.points, probe.weights);
-    probe.npoint = mesh.info.npoint;
-    probe.ntet = mesh.info.ntet;
-    while (!std::equal(probe.points, probe.points + 4, mesh.info.tets + 4 * size_t(probe.cell))) ++probe.cell;
+    uint32_t points[4];
+    locate_near(p.point, p.pointer, p.body, mesh, points, probe.weights);
+    while (!std::equal(points, points + 4, mesh.info.tets + 4 * size_t(probe.cell))) ++probe.cell;
     // Probes are reported in the scene's order, whatever the order of their bodies.
     if (probes_.size() < def_.probes.size()) probes_.resize(def_.probes.size());
     probes_[size_t(&p - def_.probes.data())] = std::move(probe);

@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "geometry/closest.h"
-#include "math/extent.h"
 #include "scene/select.h"
 
 namespace dfm::scene {
@@ -40,21 +39,16 @@ void corners_of(const BodyMesh &mesh, uint32_t cell, const double *corner[4]) {
   for (size_t k = 0; k < 4; ++k) corner[k] = &mesh.points[3 * size_t{mesh.info.tets[4 * size_t{cell} + k]}];
 }
 
-Array<RestBox> boxes_of(const BodyMesh &mesh) {
-  Array<RestBox> out;
-  for (uint32_t c = 0; c < mesh.info.ntet; ++c) {
-    const double *corner[4];
-    corners_of(mesh, c, corner);
-    Extent box;
-    for (const double *x : corner) box.add(load3(x));
-    out.push_back({box.lo, box.hi});
-  }
-  return out;
-}
-
 }  // namespace
 
-Locator::Locator(const BodyMesh &mesh) : mesh_(mesh), box_(boxes_of(mesh)), tree_(Memory::standard(), box_) {}
+Locator::Locator(const BodyMesh &mesh)
+    : mesh_(mesh), tree_(Memory::standard(), mesh.info.ntet, [&](uint32_t c) {
+        const double *corner[4];
+        corners_of(mesh, c, corner);
+        Extent box;
+        for (const double *x : corner) box.add(load3(x));
+        return box;
+      }) {}
 
 double Locator::find(const double point[3], uint32_t corners[4], double weights[4]) const {
   constexpr double kRounding = 1e-12;  // of the distances of a cell and of its box

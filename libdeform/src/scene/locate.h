@@ -17,7 +17,6 @@ class Locator {
 
  private:
   const BodyMesh &mesh_;
-  Array<RestBox> box_;
   RestTree tree_;
 };
 

@@ -102,15 +102,7 @@ Params read_params(const Node &params, const dfm_type *type) {
   for (const auto &entry : params.value().items()) {
     const Node value = params.member(entry.key());
     const dfm_param *p = find_row(*type, shorthand && entry.key() == "mu" ? "mu_C" : entry.key().c_str());
-    if (!p) {
-      const std::string near = nearest(entry.key(), valid);
-      if (valid.empty()) value.fail("%s has no parameters", type->id);
-      if (!near.empty())
-        value.fail("%s has no parameter \"%s\"; did you mean \"%s\"?", type->id, entry.key().c_str(),
-                   near.c_str());
-      value.fail("%s has no parameter \"%s\"; it has: %s", type->id, entry.key().c_str(),
-                 join(valid).c_str());
-    }
+    if (!p) value.fail("%s", no_parameter(*type, "parameter", entry.key(), valid).c_str());
     out.keys.push_back(entry.key());
     out.values.push_back(read_param(value, *p));
   }
@@ -160,6 +152,14 @@ void check_fresh(const Node &name, const std::string &value, const std::vector<s
                  const char *what) {
   if (listed(taken, value))
     name.fail("the name \"%s\" is taken by another %s; names are unique", value.c_str(), what);
+}
+
+void check_keys_of(const Node &node, const std::vector<KeyOf> &keys, const char *what,
+                   const std::string &word) {
+  for (const auto &[key, words] : keys)
+    if (node.has(key) && !listed(words, word))
+      node.member(key).fail("%s %s has no \"%s\"; that is for %s", what, word.c_str(), key,
+                            join(words).c_str());
 }
 
 void check_rising(const Node &key, double previous, double t) {

@@ -57,6 +57,14 @@ std::string known(const Node &name, const std::vector<std::string> &valid, const
 void read_carriers(const Node &body, const dfm_type *model, ReadContext &context, Body &out);
 Body read_body(const Node &node, ReadContext &context);
 Obstacle read_obstacle(const Node &node, ReadContext &context);
+// A key that belongs to some of the words which say what its holder is.
+struct KeyOf {
+  const char *key;
+  std::vector<std::string> words;
+};
+// Refuses keys of other words; what: "the shape".
+void check_keys_of(const Node &node, const std::vector<KeyOf> &keys, const char *what,
+                   const std::string &word);
 // Size and pose of a shape, for obstacles and rigid bodies; kind: of the pose's object.
 void check_shape_keys(const Node &node, const std::string &shape);
 dfm_pose read_pose(const Node &holder, const char *kind, double *scale);

@@ -197,25 +197,20 @@ MadeMesh read_made(const Node &node) {
   MadeMesh made;
   node.object("made_mesh");
   made.kind = node.at("make").word("make");
-  const bool bricks = made.kind == "bricks", round = made.kind != "beam" && !bricks,
-             tube = made.kind == "tube", along = tube || made.kind == "cylinder";
-  const std::pair<const char *, bool> wanted[] = {
-      {"radius", round}, {"inner", tube}, {"length", along}, {"size", !round}};
-  std::string all;
-  for (const auto &[key, mine] : wanted)
-    if (mine) all += (all.empty() ? "" : ", ") + std::string(key);
-  for (const auto &[key, mine] : wanted)
-    if (!mine && node.has(key))
-      node.member(key).fail("a %s has no \"%s\"; its size is given by %s", made.kind.c_str(), key,
-                            all.c_str());
-  if (round) {
+  static const std::vector<KeyOf> kKeys = {{"radius", {"cylinder", "ball", "tube"}},
+                                           {"inner", {"tube"}},
+                                           {"length", {"cylinder", "tube"}},
+                                           {"size", {"beam", "bricks"}}};
+  check_keys_of(node, kKeys, "a", made.kind);
+  const bool tube = made.kind == "tube";
+  if (made.kind == "beam" || made.kind == "bricks") {
+    read_sizes(node.at("size"), "edges", made.size);
+  } else {
     const double radius = node.at("radius").number(kPositive);
     size_t k = 0;
     if (tube) made.size[k++] = node.at("inner").number({0, radius, true, true});
     made.size[k++] = radius;
-    if (along) made.size[k] = node.at("length").number(kPositive);
-  } else {
-    read_sizes(node.at("size"), "edges", made.size);
+    if (tube || made.kind == "cylinder") made.size[k] = node.at("length").number(kPositive);
   }
   made.cells = read_count(node.member("cells", 1000), 1, 1e8);
   made.order = read_count(node.member("order", 1), 1, 2);
@@ -384,16 +379,12 @@ Body read_body(const Node &node, ReadContext &context) {
   return b;
 }
 
-// Which of the keys that place or size a shape belong to it.
 void check_shape_keys(const Node &node, const std::string &shape) {
-  static const std::pair<const char *, std::vector<std::string>> kShapesOf[] = {
+  static const std::vector<KeyOf> kKeys = {
       {"point", {"plane"}},   {"normal", {"plane"}},        {"radius", {"sphere", "capsule"}},
       {"half_size", {"box"}}, {"half_length", {"capsule"}}, {"mesh", {"mesh", "voxels"}},
       {"cells", {"voxels"}}};
-  for (const auto &[key, shapes] : kShapesOf)
-    if (node.has(key) && !listed(shapes, shape))
-      node.member(key).fail("the shape %s has no \"%s\"; that is for %s", shape.c_str(), key,
-                            shapes[0].c_str());
+  check_keys_of(node, kKeys, "the shape", shape);
 }
 
 template <class Def>

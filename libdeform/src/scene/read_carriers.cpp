@@ -4,7 +4,6 @@
 #include <cmath>
 #include <span>
 
-#include "core/names.h"
 #include "plugin/params.h"
 #include "plugin/registry.h"
 #include "scene/keys.h"
@@ -29,12 +28,8 @@ void read_fields(const Node &node, const dfm_type *model, Body &b) {
   for (const auto &entry : node.value().items()) {
     const Node value = node.member(entry.key());
     const dfm_param *row = find_row(*model, entry.key().c_str());
-    if (!row || !(row->flags & DFM_PARAM_PER_CELL)) {
-      const std::string meant = row ? "" : did_you_mean(entry.key(), valid);
-      const std::string has = valid.empty() ? "it has none" : "it has: " + join(valid);
-      value.fail("%s has no parameter \"%s\" that may differ by cell%s; %s", model->id, entry.key().c_str(),
-                 meant.c_str(), has.c_str());
-    }
+    if (!row || !(row->flags & DFM_PARAM_PER_CELL))
+      value.fail("%s", no_parameter(*model, "parameter by cell", entry.key(), valid).c_str());
     if (listed(b.params.keys, entry.key()))
       value.fail("\"%s\" is given in the model's params too; keep one", entry.key().c_str());
     b.fields.push_back({value.pointer(), entry.key(), value.text(), row->width ? row->width : 1, false});
@@ -61,9 +56,7 @@ void read_anisotropy_params(const Node &params, const dfm_type *model, Body &b) 
     const Node value = params.member(entry.key());
     const dfm_param *row = find_row(*model, (kPrefix + entry.key()).c_str());
     if (!row) row = find_row(*model, entry.key().c_str());
-    if (!row)
-      value.fail("%s has no anisotropy parameter \"%s\"%s; it has: %s", model->id, entry.key().c_str(),
-                 did_you_mean(entry.key(), valid).c_str(), valid.empty() ? "none" : join(valid).c_str());
+    if (!row) value.fail("%s", no_parameter(*model, "anisotropy parameter", entry.key(), valid).c_str());
     if (std::string(row->key) == kAxis)
       value.fail("the direction is given by \"axis\" or \"field\" beside \"params\"");
     if (listed(b.params.keys, row->key))

@@ -7,39 +7,31 @@
 namespace dfm::scene {
 namespace {
 
-// In the order of the words.
-struct Shape {
-  uint32_t number;
-  std::vector<std::string> keys;
-};
-const Shape &shape_of(const std::string &word) {
-  static const std::vector<Shape> list = {{DFM_CUT_PLANE, {"point", "normal"}},
-                                          {DFM_CUT_BLADE, {"corners"}},
-                                          {DFM_CUT_ELLIPSOID, {"radius", "pose"}},
-                                          {DFM_CUT_BOX, {"half_size", "pose"}},
-                                          {DFM_CUT_ELLIPSOID, {"half_size", "pose"}}};
-  return list[number_of("cut_shape", word)];
-}
-
 void read_shape(const Node &node, const std::string &word, dfm_cut_def &d) {
-  const Shape &shape = shape_of(word);
-  for (const char *key : {"point", "normal", "corners", "radius", "half_size", "pose"})
-    if (node.has(key) && !listed(shape.keys, key))
-      node.member(key).fail("a cut of the shape %s has no \"%s\"", word.c_str(), key);
-  d.shape = shape.number;
-  if (listed(shape.keys, "normal")) {
+  static const std::vector<KeyOf> kKeys = {{"point", {"plane"}},
+                                           {"normal", {"plane"}},
+                                           {"corners", {"blade"}},
+                                           {"radius", {"sphere"}},
+                                           {"half_size", {"box", "ellipsoid"}},
+                                           {"pose", {"sphere", "box", "ellipsoid"}}};
+  check_keys_of(node, kKeys, "a cut of the shape", word);
+  if (word == "plane") {
+    d.shape = DFM_CUT_PLANE;
     node.at("point").vector(d.blade);
-    read_direction(node.at("normal"), "the normal of a plane", d.blade + 3);
+    return read_direction(node.at("normal"), "the normal of a plane", d.blade + 3);
   }
-  if (listed(shape.keys, "corners")) {
+  if (word == "blade") {
+    d.shape = DFM_CUT_BLADE;
     const std::vector<Node> corners = node.at("corners").items();
     if (corners.size() != 4)
       node.at("corners").fail("expected four points, in order around the blade; found %zu", corners.size());
     for (size_t k = 0; k < 4; ++k) corners[k].vector(d.blade + 3 * k);
+    return;
   }
-  if (listed(shape.keys, "radius")) std::fill_n(d.half_size, 3, node.at("radius").number(kPositive));
-  if (listed(shape.keys, "half_size")) read_sizes(node.at("half_size"), "half sizes", d.half_size);
-  if (listed(shape.keys, "pose")) d.pose = read_pose(node, "cut_pose", nullptr);
+  d.shape = word == "box" ? DFM_CUT_BOX : DFM_CUT_ELLIPSOID;
+  if (word == "sphere") std::fill_n(d.half_size, 3, node.at("radius").number(kPositive));
+  else read_sizes(node.at("half_size"), "half sizes", d.half_size);
+  d.pose = read_pose(node, "cut_pose", nullptr);
 }
 
 }  // namespace

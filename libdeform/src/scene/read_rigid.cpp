@@ -41,20 +41,16 @@ Joint read_joint(const Node &node, const RigidBody &body, const std::vector<std:
   j.pointer = node.pointer();
   const std::string type = node.at("type").word("joint_type");
   j.def.type = number_of("joint_type", type);
-  const bool has_axis = j.def.type == DFM_JOINT_HINGE || j.def.type == DFM_JOINT_SLIDER;
   if (node.has("with") && !node.member("with").value().is_null()) {
     j.with = known(node.member("with"), names, "rigid body");
     if (j.with == body.name) node.member("with").fail("\"%s\" cannot be tied to itself", j.with.c_str());
   }
   const double *const p = body.def.pose.position;
   node.vector("anchor", j.def.anchor, p[0], p[1], p[2]);
-  if (has_axis) {
+  check_keys_of(node, {{"axis", {"hinge", "slider"}}, {"motor", {"hinge", "slider"}}}, "a joint of the type",
+                type);
+  if (j.def.type == DFM_JOINT_HINGE || j.def.type == DFM_JOINT_SLIDER)
     read_direction(node.at("axis"), "the axis of a joint", j.def.axis);
-  } else {
-    for (const char *key : {"axis", "motor"})
-      if (node.has(key))
-        node.member(key).fail("a %s joint has no \"%s\"; that is for a hinge or a slider", type.c_str(), key);
-  }
   if (node.has("motor")) {
     const Node motor = node.member("motor").object("motor");
     j.def.motor = 1;

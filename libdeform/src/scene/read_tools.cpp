@@ -10,31 +10,15 @@ namespace {
 constexpr Range kOpening{0, kWidest, false, false};
 constexpr Range kLate{0, 0.1, false, false};  // s
 
-// Which size a shape needs; jaws may have a shaft beside theirs.
-bool needs(uint32_t shape, const std::string &key) {
-  const bool round = shape == DFM_TOOL_SPHERE || shape == DFM_TOOL_CAPSULE;
-  if (key == "radius") return round;
-  if (key == "half_length") return shape == DFM_TOOL_CAPSULE;
-  if (key == "mesh") return shape == DFM_TOOL_MESH;
-  return key == "half_size" && !round && shape != DFM_TOOL_MESH;
-}
-
-void check_keys(const Node &node, const dfm_tool_def &d) {
-  for (const char *key : {"radius", "half_size", "half_length", "mesh", "opening_deg"})
-    if (node.has(key) && !needs(d.shape, key) &&
-        !(has_jaws(d) && listed({"radius", "half_length", "opening_deg"}, key)))
-      node.member(key).fail("a tool of the shape %s has no \"%s\"", word_of("tool_shape", d.shape).c_str(),
-                            key);
-}
-
+// Jaws may have a shaft, of a radius and a length.
 void read_size(const Node &node, Tool &t) {
   dfm_tool_def &d = t.def;
+  const bool capsule = d.shape == DFM_TOOL_CAPSULE, round = capsule || d.shape == DFM_TOOL_SPHERE;
   d.radius = d.half_length = 0;
-  if (needs(d.shape, "radius") || node.has("radius")) d.radius = node.at("radius").number(kPositive);
-  if (needs(d.shape, "half_length") || node.has("half_length"))
-    d.half_length = node.at("half_length").number(kNotNegative);
-  if (needs(d.shape, "mesh")) t.solid.mesh = node.at("mesh").text();
-  if (needs(d.shape, "half_size")) read_sizes(node.at("half_size"), "half sizes", d.half_size);
+  if (round || node.has("radius")) d.radius = node.at("radius").number(kPositive);
+  if (capsule || node.has("half_length")) d.half_length = node.at("half_length").number(kNotNegative);
+  if (d.shape == DFM_TOOL_MESH) t.solid.mesh = node.at("mesh").text();
+  else if (!round) read_sizes(node.at("half_size"), "half sizes", d.half_size);
 }
 
 void read_opening(const Node &opening, Tool &t) {
@@ -87,7 +71,13 @@ Tool read_tool(const Node &node, ReadContext &context) {
   t.solid.id = read_id(node);
   const std::string shape = node.at("shape").word("tool_shape");
   t.def.shape = number_of("tool_shape", shape);
-  check_keys(node, t.def);
+  static const std::vector<KeyOf> kKeys = {
+      {"radius", {"sphere", "capsule", "grasper", "scissors"}},
+      {"half_size", {"box", "grasper", "scissors", "ellipsoid", "blade"}},
+      {"half_length", {"capsule", "grasper", "scissors"}},
+      {"mesh", {"mesh"}},
+      {"opening_deg", {"grasper", "scissors"}}};
+  check_keys_of(node, kKeys, "a tool of the shape", shape);
   std::vector<std::string> names = {t.solid.name};
   const bool jaws = has_jaws(t.def), of_triangles = t.def.shape == DFM_TOOL_MESH;
   for (const char *part : {".left", ".right"})

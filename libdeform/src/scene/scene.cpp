@@ -4,12 +4,15 @@
 #include <limits>
 
 #include "core/error.h"
+#include "core/handle.h"
 #include "plugin/context.h"
 #include "scene/build.h"
 #include "scene/device.h"
 #include "scene/node.h"
 #include "scene/planner/planner.h"
 #include "scene/read.h"
+#include "snapshot/snapshot_cuts.h"
+#include "state/world.h"
 
 namespace dfm::scene {
 
@@ -66,63 +69,45 @@ dfm_world Scene::release_world() { return std::exchange(world_, 0); }
 
 namespace {
 
-void need(const ProbePoint &p, dfm_status status) {
-  if (status < 0) fail(status, "probe \"%s\": %s", p.name.c_str(), dfm_last_error());
-}
-
-// The four points of a probe's cell as they are numbered now: a cut gives cells and points new numbers.
-// False: the body does not have the cell.
-bool find_cell(const ProbePoint &p, dfm_body body, uint32_t points[4]) {
-  dfm_body_info info = {};
-  info.size = sizeof info;
-  need(p, dfm_body_get_info(body, &info));
-  if (body == p.body && info.ntet == p.ntet && info.npoint == p.npoint) {
-    std::copy_n(p.points, 4, points);
-    return true;
+// The four points of a cell as they are numbered now: a cut gives cells and points new numbers. Null: the
+// body does not have the cell.
+const uint32_t *points_of(const dfm::Body &b, uint32_t cell) {
+  if (b.emptied || b.rolled_back) return nullptr;
+  if (b.cut.whole) {
+    const auto at = std::ranges::find(b.cut.cell, cell);
+    if (at == b.cut.cell.end()) return nullptr;
+    cell = uint32_t(at - b.cut.cell.begin());
   }
-  if (info.ntet == 0) return false;
-  std::vector<uint32_t> origins(info.ntet), cells(4 * size_t(info.ntet));
-  need(p, dfm_body_origins(body, 0, nullptr, info.ntet, origins.data()));
-  need(p, dfm_body_get_rest(body, 0, nullptr, info.ntet, cells.data()));
-  const auto at = std::find(origins.begin(), origins.end(), p.cell);
-  if (at == origins.end()) return false;
-  std::copy_n(cells.begin() + 4 * (at - origins.begin()), 4, points);
-  return true;
+  return &b.tets[4 * size_t{cell}];
 }
 
 }  // namespace
 
-dfm_body Scene::probe_body(size_t i, uint32_t points[4]) const {
+dfm::Body *Scene::probe_body(size_t i, const uint32_t *&points) const {
   const ProbePoint &p = probes_[i];
-  if (find_cell(p, p.body, points)) return p.body;
-  uint32_t n = 0;
-  need(p, dfm_body_pieces(p.body, 0, nullptr, &n));
-  std::vector<dfm_body> pieces(n);
-  if (n > 0) need(p, dfm_body_pieces(p.body, n, pieces.data(), &n));
-  for (const dfm_body piece : pieces)
-    if (find_cell(p, piece, points)) return piece;
-  return 0;
+  dfm::Body &own = resolve<dfm::Body>(Kind::body, p.body);
+  points = points_of(own, p.cell);
+  if (points) return &own;
+  for (dfm::Body *const other : all_bodies(*own.world)) {
+    if (other->piece_of != own.id) continue;
+    points = points_of(*other, p.cell);
+    if (points) return other;
+  }
+  return nullptr;
 }
 
-void Scene::probe_state(size_t i, double position[3], double velocity[3]) {
-  const ProbePoint &p = probes_[i];
-  uint32_t n = 0, points[4];
-  const dfm_body body = probe_body(i, points);
-  if (!body) {
-    std::fill_n(position, 3, std::numeric_limits<double>::quiet_NaN());
-    std::fill_n(velocity, 3, std::numeric_limits<double>::quiet_NaN());
-    return;
+void Scene::probe_state(size_t i, double position[3], double velocity[3]) const {
+  const uint32_t *points;
+  const dfm::Body *const b = probe_body(i, points);
+  const double none = b ? 0 : std::numeric_limits<double>::quiet_NaN();
+  Vec3 x{none, none, none}, v = x;
+  if (b) b->dynamics->see_points();
+  for (uint32_t c = 0; b && c < 4; ++c) {
+    x += probes_[i].weights[c] * b->p.x_at(points[c]);
+    v += probes_[i].weights[c] * b->p.v_at(points[c]);
   }
-  need(p, dfm_body_get_state(body, 0, nullptr, nullptr, &n));
-  std::vector<double> x(3 * size_t(n)), v(3 * size_t(n));
-  need(p, dfm_body_get_state(body, n, x.data(), v.data(), &n));
-  for (int k = 0; k < 3; ++k) {
-    position[k] = velocity[k] = 0;
-    for (int c = 0; c < 4; ++c) {
-      position[k] += p.weights[c] * x[3 * size_t(points[c]) + size_t(k)];
-      velocity[k] += p.weights[c] * v[3 * size_t(points[c]) + size_t(k)];
-    }
-  }
+  store3(position, x);
+  store3(velocity, v);
 }
 
 std::string Scene::value(const std::string &pointer) const {

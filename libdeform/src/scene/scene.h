@@ -6,13 +6,16 @@
 
 #include "scene/defs.h"
 
+namespace dfm {
+struct Body;
+}
+
 namespace dfm::scene {
 
 struct ProbePoint {
   std::string name;
   dfm_body body = 0;
-  uint32_t cell = 0, points[4] = {};  // numbers when the body was made
-  uint32_t npoint = 0, ntet = 0;      // of the body then
+  uint32_t cell = 0;  // its number when the body was made
   double weights[4] = {};
 };
 
@@ -29,10 +32,10 @@ class Scene {
   const Definition &definition() const { return definition_; }
   size_t probe_count() const { return probes_.size(); }
   const ProbePoint &probe(size_t i) const { return probes_[i]; }
-  // Which has the probe's cell, the body or a piece of it, and the cell's points there; 0: none has.
-  dfm_body probe_body(size_t i, uint32_t points[4]) const;
+  // Which has the probe's cell, the body or a piece of it, and the cell's four points there; null: none has.
+  dfm::Body *probe_body(size_t i, const uint32_t *&points) const;
   // NAN where none has.
-  void probe_state(size_t i, double position[3], double velocity[3]);
+  void probe_state(size_t i, double position[3], double velocity[3]) const;
   std::string value(const std::string &pointer) const;  // JSON text; throws where nothing is
 
  private:

@@ -20,10 +20,7 @@ void zone(Hash &h, const SurfaceZones::Zone &z) {
 
 void composition(Hash &h, const Composition &m) {
   for (const Material &x : m.materials) {
-    h.add(x.def.young);
-    h.add(x.def.poisson);
-    h.add(x.def.damping_mass);
-    h.add(x.def.damping_stiffness);
+    for (const auto &[key, at] : kMaterialMembers) h.add(x.def.*at);
     for (size_t i = 0; i < x.extra_keys.size(); ++i) h.list(x.extra_keys[i], x.extra_values[i]);
   }
   h.list(m.of);

@@ -123,10 +123,8 @@ namespace {
 
 // A model parameter that the body does not give comes from the material's entry of the same key.
 std::vector<double> values_of(const dfm_type &type, const dfm_params &given, const Material &m) {
-  std::vector<dfm_param_value> entries = {{"young", &m.def.young, 1},
-                                          {"poisson", &m.def.poisson, 1},
-                                          {"damping_mass", &m.def.damping_mass, 1},
-                                          {"damping_stiffness", &m.def.damping_stiffness, 1}};
+  std::vector<dfm_param_value> entries;
+  for (const auto &[key, at] : kMaterialMembers) entries.push_back({key, &(m.def.*at), 1});
   for (size_t i = 0; i < m.extra_keys.size(); ++i)
     entries.push_back(
         {m.extra_keys[i].c_str(), m.extra_values[i].data(), static_cast<uint32_t>(m.extra_values[i].size())});

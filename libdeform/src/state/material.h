@@ -1,6 +1,7 @@
 // The materials of a body by cell: density, share of each cell that is material, and parameters of the model
 // that differ between cells.
 #pragma once
+#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -10,6 +11,20 @@ namespace dfm {
 
 inline constexpr char kToughnessKey[] = "fracture_energy";  // J/m2 that a cut by a blade takes
 inline constexpr char kTearKey[] = "tear";  // entry of a material: the strain at which it tears
+
+// Members of the def that models have as parameters, too.
+struct MaterialMember {
+  const char *key;
+  double dfm_material_def::*at;
+};
+inline constexpr MaterialMember kMaterialMembers[] = {
+    {"young", &dfm_material_def::young},
+    {"poisson", &dfm_material_def::poisson},
+    {"damping_mass", &dfm_material_def::damping_mass},
+    {"damping_stiffness", &dfm_material_def::damping_stiffness}};
+inline bool is_material_member(const std::string &key) {
+  return std::ranges::any_of(kMaterialMembers, [&](const MaterialMember &m) { return key == m.key; });
+}
 
 struct Body;
 struct CellField;

@@ -4,6 +4,7 @@
 
 #include "body/make_surface.h"
 #include "core/error.h"
+#include "geometry/area.h"
 #include "geometry/bulge.h"
 #include "mesh/mesh.h"
 #include "plugin/context.h"
@@ -38,13 +39,7 @@ void check_surface(const dfm_surface_def &def, const Body &b) {
 void check_outward(const Surface &s, const Body &b) {
   for (uint32_t e = 0; e < 2 * s.nedge; ++e)
     if (s.edge_tri[e] == kNone) return;
-  const Vec3 origin = load3(&s.x[0]);
-  double volume = 0;
-  for (uint32_t t = 0; t < s.ntri; ++t) {
-    const auto x = [&](int k) { return load3(&s.x[size_t{4} * s.tri[size_t{3} * t + size_t(k)]]) - origin; };
-    volume += dot(x(0), cross(x(1), x(2))) / 6;
-  }
-  if (volume < 0)
+  if (signed_volume(s.tri, [&](uint32_t i) { return load3(&s.x[4 * size_t{i}]); }) < 0)
     refuse(b, ": its surface is closed and faces inward; reverse its triangles (dfm_mesh_create does)");
 }
 

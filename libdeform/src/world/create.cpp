@@ -9,6 +9,7 @@
 #include "core/error.h"
 #include "core/handle.h"
 #include "friction/pair_rules.h"
+#include "geometry/area.h"
 #include "geometry/voxel_grid.h"
 #include "mesh/cells.h"
 #include "plugin/context.h"
@@ -247,16 +248,6 @@ void take_triangles(Obstacle &o, const dfm_obstacle_def &def) {
   o.def.triangles = o.triangles.data();
 }
 
-double signed_volume(const Obstacle &o) {
-  const Vec3 origin = load3(o.points.data());
-  double sum = 0;
-  for (size_t t = 0; t < o.triangles.size(); t += 3) {
-    const auto x = [&](size_t k) { return load3(&o.points[size_t(3) * o.triangles[t + k]]) - origin; };
-    sum += dot(x(0), cross(x(1), x(2))) / 6;
-  }
-  return sum;
-}
-
 void make_voxels(Obstacle &o, const Memory &memory) {
   const uint32_t cells = o.def.cells ? o.def.cells : kVoxelCells;
   if (cells < kFewestVoxelCells || cells > kMaxVoxelCells)
@@ -265,7 +256,7 @@ void make_voxels(Obstacle &o, const Memory &memory) {
     refuse(o,
            ": voxels need a closed surface, and this one has open edges or edges of more than two triangles, "
            "so no place is inside or outside; close it, or use the shape mesh, which takes open ones");
-  if (!(signed_volume(o) > 0))
+  if (!(signed_volume(o.triangles, [&](uint32_t i) { return load3(&o.points[3 * size_t{i}]); }) > 0))
     refuse(o,
            ": its surface encloses no volume or faces inward; reverse its triangles (dfm_mesh_create does)");
   o.grid = std::make_unique<VoxelGrid>(memory, o.points.data(), o.def.ntriangle, o.triangles.data(), cells);

@@ -1,5 +1,6 @@
 // Creates and removes bodies and obstacles. All functions throw Error; then the world is unchanged.
 #pragma once
+#include <algorithm>
 #include <memory>
 #include <string>
 
@@ -16,6 +17,18 @@ inline const char *integrator_name(uint32_t integrator) {
   return integrator == DFM_INTEGRATOR_SYMPLECTIC_EULER ? "symplectic_euler"
          : integrator == DFM_INTEGRATOR_TR_BDF2        ? "tr_bdf2"
                                                        : "implicit_euler";
+}
+
+// What a shape has in the defs of obstacles, rigid bodies and tools alike.
+template <class To, class From>
+void copy_shape(To &to, const From &from) {
+  std::copy_n(from.half_size, 3, to.half_size);
+  to.radius = from.radius;
+  to.half_length = from.half_length;
+  to.material = from.material;
+  to.category = from.category;
+  to.collides_with = from.collides_with;
+  to.user = from.user;
 }
 
 Body &create_body(World &w, const dfm_body_def &def);

@@ -1,7 +1,6 @@
 #include "world/idle.h"
 
 #include <algorithm>
-#include <cstring>
 
 #include "core/error.h"
 #include "core/names.h"
@@ -12,16 +11,9 @@
 namespace dfm {
 namespace {
 
-// Keys that every material has, which users expect to have an effect at any value.
-bool from_material(const char *key) {
-  for (const char *k : {"young", "poisson", "damping_mass", "damping_stiffness"})
-    if (!std::strcmp(key, k)) return true;
-  return false;
-}
-
 // For a key that no model knows: the nearest one that the body's model has.
 std::string meant(const Body &b, const std::string &key) {
-  if (from_material(key.c_str())) return {};
+  if (is_material_member(key)) return {};
   for (const dfm_type *model : b.world->context->registry.list(DFM_KIND_MODEL))
     if (find_row(*model, key.c_str())) return {};
   std::vector<std::string> known = {"density", "friction", kTearKey, kToughnessKey};
@@ -40,11 +32,8 @@ std::vector<Unused> find_unused(const dfm_type &type, const CellMaterials &cells
       out.push_back({key, material});
   };
   for (const Material *m : cells.list) {
-    const dfm_material_def &d = m->def;
-    if (d.young != plain.young) note("young", m->name);
-    if (d.poisson != plain.poisson) note("poisson", m->name);
-    if (d.damping_mass != plain.damping_mass) note("damping_mass", m->name);
-    if (d.damping_stiffness != plain.damping_stiffness) note("damping_stiffness", m->name);
+    for (const auto &[key, at] : kMaterialMembers)
+      if (m->def.*at != plain.*at) note(key, m->name);
     for (const std::string &key : m->extra_keys)
       if (key != "friction" && key != kTearKey && key != kToughnessKey) note(key, m->name);
   }
@@ -74,7 +63,8 @@ std::vector<IdleParam> idle_params(const Body &b) {
     const double *const now = &b.model.params[at];
     const bool chosen = std::ranges::find(b.fields, row.key, &CellField::key) != b.fields.end() ||
                         std::any_of(now, now + row.width, [&](double x) { return x != row.def; });
-    if (chosen || from_material(row.key)) out.push_back({row.key, why, chosen});
+    // users expect an effect of these at any value
+    if (chosen || is_material_member(row.key)) out.push_back({row.key, why, chosen});
   }
   return out;
 }

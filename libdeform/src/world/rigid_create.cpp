@@ -80,13 +80,7 @@ std::unique_ptr<Obstacle> make_part(World &w, const dfm_rigid_def &d) {
   o.shape = d.shape;
   o.name = d.name;
   o.pose = d.pose;
-  std::copy(d.half_size, d.half_size + 3, o.half_size);
-  o.radius = d.radius;
-  o.half_length = d.half_length;
-  o.material = d.material;
-  o.category = d.category;
-  o.collides_with = d.collides_with;
-  o.user = d.user;
+  copy_shape(o, d);
   return make_obstacle(w, o, true);
 }
 

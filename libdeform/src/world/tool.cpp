@@ -94,16 +94,10 @@ std::vector<dfm_rigid_def> parts_of(const dfm_tool_def &d, const std::string &na
                 : d.shape == DFM_TOOL_CAPSULE                          ? DFM_SHAPE_CAPSULE
                 : d.shape == DFM_TOOL_BOX || d.shape == DFM_TOOL_BLADE ? DFM_SHAPE_BOX
                                                                        : DFM_SHAPE_NONE;
-  std::copy(d.half_size, d.half_size + 3, frame.half_size);
-  frame.radius = d.radius;
-  frame.half_length = d.half_length;
+  copy_shape(frame, d);
   // without effect: only its host moves it
   frame.mass = 1;
   std::fill(frame.inertia, frame.inertia + 3, 1.0);
-  frame.material = d.material;
-  frame.category = d.category;
-  frame.collides_with = d.collides_with;
-  frame.user = d.user;
   motion.parts.push_back({{}, 0});
   names.push_back(name);
   std::vector<dfm_rigid_def> out{frame};
@@ -129,16 +123,11 @@ std::vector<std::unique_ptr<Obstacle>> make_shapes(World &w, const dfm_tool_def 
   std::vector<std::unique_ptr<Obstacle>> out;
   dfm_obstacle_def shape{};
   shape.size = sizeof shape;
-  shape.material = d.material;
-  shape.category = d.category;
-  shape.collides_with = d.collides_with;
-  shape.user = d.user;
-  shape.radius = d.radius;
+  copy_shape(shape, d);
   if (has_jaws(d) && d.radius > 0) {
     const std::string shaft = name + ".shaft";
     shape.name = shaft.c_str();
     shape.shape = DFM_SHAPE_CAPSULE;
-    shape.half_length = d.half_length;
     shape.pose.position[2] = d.half_length;
     out.push_back(make_rigid_shape(w, name, shape));
   }
