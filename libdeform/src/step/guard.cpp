@@ -401,9 +401,8 @@ bool jammed(const World &w, const StepContext &step) {
   // contact may have an answer that the budget has not let it find
   if (step.budget.divided && step.budget.cheapened) return false;
   const auto prescribed = [&](const Obstacle &o) {
-    return !o.rigid || std::any_of(w.tools.begin(), w.tools.end(), [&](const auto &t) {
-      return t->set == o.rigid && !t->motion.coupled();
-    });
+    return !o.rigid || std::any_of(w.tools.begin(), w.tools.end(),
+                                   [&](const auto &t) { return t->set == o.rigid && !t->motion.coupled(); });
   };
   for (size_t o = 0; o < w.obstacles.size(); ++o)
     if (step.obstacle_views[o].moves() && prescribed(*w.obstacles[o])) return true;
