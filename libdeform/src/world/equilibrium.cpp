@@ -81,8 +81,8 @@ class SettlingPoints : public ImplicitPoints {
     return model_.call("add_forces", [&] { return model_.ops->add_forces(model_.self, &k, p_.f.data()); }) ==
            DFM_OK;
   }
-  // The same. Sets the state of the model to its limit after infinite time (relaxed, flowed). Returns false if
-  // there is no limit, or the model fails.
+  // The same. Sets the state of the model to its limit after infinite time (relaxed, flowed). Returns false
+  // if there is no limit, or the model fails.
   bool relax(double time) {
     if (model_.state.empty()) return false;
     std::fill(p_.f.begin(), p_.f.end(), 0.0);
