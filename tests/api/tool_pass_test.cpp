@@ -88,3 +88,33 @@ TEST(ToolPass, TwoDrivenTools_PassWithOneSentence) {
       EXPECT_EQ(context.log.find("have met", first + 40), std::string::npos) << context.log;
     }
 }
+
+// A blade without a coupling presses a soft cube flat on a floor, in 50 ms. It does not yield, so in the end
+// no state holds cube, floor and blade apart.
+TEST(ToolPass, SoftCubePressedFlatByADrivenTool_StopsAndSaysWhy) {
+  test::Context context;
+  const dfm_world w = test::make_world(context, {0, 0, 0});
+  test::BodyOptions cube;
+  cube.name = "cube";
+  cube.young = 3e4;
+  cube.poisson = 0.4;
+  cube.position = {-0.01, -0.01, 0.0005};
+  test::make_body(context, w, "beam", {0.02, 0.02, 0.02}, 5, cube);
+  test::add_plane(w, "floor");
+  test::set_friction(w, 0.5);
+  dfm_tool_def d = dfm_tool_def_default();
+  d.name = "press";
+  d.shape = DFM_TOOL_BLADE;
+  for (int k = 0; k < 3; ++k) d.half_size[k] = k == 2 ? 0.01 : 0.03;
+  d.pose = pose({0, 0, 0.032});
+  const dfm_tool press = make(w, d);
+  dfm_status status = DFM_OK;
+  for (int i = 1; i <= 50 && status == DFM_OK; ++i) {
+    const dfm_pose to = pose({0, 0, 0.032 * (1 - i / 50.0)});
+    test::ok(dfm_tool_set_pose(press, &to, nullptr));
+    status = dfm_world_step(w, 1e-3, nullptr);
+  }
+  EXPECT_NE(status, DFM_OK);
+  EXPECT_NE(std::string(dfm_last_error()).find("squeezed until nothing can move"), std::string::npos)
+      << dfm_last_error();
+}

@@ -27,6 +27,7 @@
 #include "math/turn.h"
 #include "plugin/context.h"
 #include "state/obstacle.h"
+#include "state/tool.h"
 #include "state/world.h"
 #include "step/context.h"
 #include "step/move_obstacles.h"
@@ -393,14 +394,18 @@ bool wake_hit(World &w, StepContext &step) {
 
 // No motion is left, and the contact solve has no solution: the bodies are jammed. Impulses that cannot help
 // would grow from sub-step to sub-step, and their rounding error would become motion. Only prescribed motion
-// can cause this, because a free body yields.
+// can cause this, because free bodies and coupled tools yield.
 bool jammed(const World &w, const StepContext &step) {
   if (!(step.guard.motion < kNoWay && step.h > 0.5 * step.length.planned && step.residual.required > 1))
     return false;
   // contact may have an answer that the budget has not let it find
   if (step.budget.divided && step.budget.cheapened) return false;
+  const auto prescribed = [&](const Obstacle &o) {
+    return !o.rigid || std::any_of(w.tools.begin(), w.tools.end(),
+                                   [&](const auto &t) { return t->set == o.rigid && !t->motion.coupled(); });
+  };
   for (size_t o = 0; o < w.obstacles.size(); ++o)
-    if (!w.obstacles[o]->rigid && step.obstacle_views[o].moves()) return true;
+    if (step.obstacle_views[o].moves() && prescribed(*w.obstacles[o])) return true;
   return !step.driven.empty();
 }
 

@@ -1,5 +1,8 @@
 #include "step/messages.h"
 
+#include <algorithm>
+
+#include "state/attachment.h"
 #include "state/obstacle.h"
 #include "state/world.h"
 
@@ -25,6 +28,15 @@ std::string names_of(const World &w, uint64_t a, uint64_t b) {
   if (a == b) return format("body '%s' on itself", first);
   return w.body(b) ? format("bodies '%s' and '%s'", first, second)
                    : format("body '%s' on obstacle '%s'", first, second);
+}
+
+const char *hint_of_attachment(const World &w, uint64_t body) {
+  const auto holds = [&](const Attachment &a) {
+    return a.body == body && a.obstacle && !a.released && !(a.stiffness > 0) && !(a.damping > 0);
+  };
+  return std::any_of(w.attachments.begin(), w.attachments.end(), holds)
+             ? "; an attachment without \"stiffness\" holds points of it, which contact cannot push out"
+             : "";
 }
 
 bool fail_step(uint32_t *trouble, uint32_t bit, const char *text, ...) {

@@ -14,6 +14,9 @@ std::string at_step(const World &w);                           // "step 12"
 std::string at_step(const World &w, const Body &b);            // "step 12, body 'a'"
 const std::string &name_of(const World &w, uint64_t id);       // of a body or an obstacle; "?": it is gone
 std::string names_of(const World &w, uint64_t a, uint64_t b);  // "body 'a' on obstacle 'b'", of what touches
+// Half a sentence for a body that an attachment without compliance holds at an obstacle; else "". If the
+// points are in or on another one, no motion satisfies attachment and contact.
+const char *hint_of_attachment(const World &w, uint64_t body);
 
 // Of a stage that fails, with the bit of its trouble: the sentence, as of printf, is the last error. Returns
 // false.

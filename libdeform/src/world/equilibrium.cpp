@@ -15,7 +15,6 @@
 #include <vector>
 
 #include "core/error.h"
-#include "dynamics/at_rest.h"
 #include "dynamics/implicit_points.h"
 #include "state/bounds.h"
 #include "state/obstacle.h"
@@ -44,6 +43,12 @@ constexpr double kAlone = 1e-10;  // of Newton's method and of forces where noth
 constexpr double kReach = 0.1;    // of its size, an edge at least: what a body may move in a step
 constexpr uint32_t kSteps = 500;  // of a load step
 constexpr double kAway = 10;      // of its size: a body in contact that has moved so far keeps sliding
+constexpr double kForever = 1e9;  // s: longer than any relaxation
+// Up to this number of points a factorization is faster than conjugate gradients on a matrix without the mass
+// term of a step.
+constexpr uint32_t kFactoredAtRest = 30000;
+// Rounding of forces, relative to the largest product of stiffness and coordinate.
+constexpr double kForceRounding = 8 * 2.220446049250313e-16;
 
 // Points on their way to an equilibrium, in steps of backward Euler from rest:
 //
@@ -70,6 +75,21 @@ class SettlingPoints : public ImplicitPoints {
   void forget_way() { std::fill(way_.begin(), way_.end(), 0.0); }  // the next step goes its whole way
   const double *contact_force() const { return force_.data(); }    // [npoint,3] N, of the last step
   double stiffest() const { return stiffest_; }                    // N/m, of a point, in the last step
+  // For points that have been stopped. Adds the forces of the model to theirs. Returns false if it fails.
+  bool add_model_forces(double time, bool trial = false) {
+    const dfm_kin k = kin(time, 0, trial);
+    return model_.call("add_forces", [&] { return model_.ops->add_forces(model_.self, &k, p_.f.data()); }) ==
+           DFM_OK;
+  }
+  // The same. Sets the state of the model to its limit after infinite time (relaxed, flowed). Returns false
+  // if there is no limit, or the model fails.
+  bool relax(double time) {
+    if (model_.state.empty()) return false;
+    std::fill(p_.f.begin(), p_.f.end(), 0.0);
+    if (!add_model_forces(time, true)) return false;
+    model_.commit_state();
+    return true;
+  }
 
   Abilities abilities() const override {
     Abilities a = ImplicitPoints::abilities();
@@ -223,7 +243,6 @@ class Settling {
     Body *body;
     std::unique_ptr<Dynamics> other;  // its normal dynamics; exchanged during the search
     SettlingPoints *points;
-    std::unique_ptr<AtRest> rest;
     double size, edge;           // m
     Vec3 contact_impulse;        // N s, before the search
     uint8_t held;                // components that are held at some point
@@ -249,7 +268,6 @@ class Settling {
     return {.body = &b,
             .other = std::move(points),
             .points = own,
-            .rest = std::make_unique<AtRest>(w_.memory(), b.p, b.model),
             .size = extent_of(b.p.x.data(), b.p.n, kStride).longest(),
             .edge = b.surface.median_edge,
             .contact_impulse = {},
@@ -276,7 +294,7 @@ class Settling {
 
   bool relax() {
     bool any = false;
-    for (One &one : bodies_) any = one.rest->relax(w_.time) || any;
+    for (One &one : bodies_) any = one.points->relax(w_.time) || any;
     return any;
   }
 
@@ -374,7 +392,7 @@ class Settling {
   void weigh(One &one) {
     sum_loads(one);
     const Phyxels &p = one.body->p;
-    if (!one.rest->add_forces(w_.time)) one.left = HUGE_VAL;
+    if (!one.points->add_model_forces(w_.time)) one.left = HUGE_VAL;
     double nan_flag = 0;
     for (size_t at = 0; at < p.x.size(); ++at) {
       double &most = p.moves(at) || at % kStride == 3 ? one.left : one.scale;

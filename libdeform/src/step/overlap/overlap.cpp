@@ -9,7 +9,7 @@
 #include "math/extent.h"
 #include "plugin/context.h"
 #include "state/world.h"
-#include "step/held_in.h"
+#include "step/messages.h"
 #include "step/overlap/overlap_sides.h"
 
 namespace dfm {

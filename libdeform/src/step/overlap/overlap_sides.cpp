@@ -9,7 +9,7 @@
 #include "body/obstacle_mesh.h"
 #include "geometry/closest.h"
 #include "geometry/pierce.h"
-#include "geometry/tree_walk.h"
+#include "geometry/triangle_search.h"
 #include "geometry/voxel_grid.h"
 
 namespace dfm {
@@ -168,18 +168,8 @@ bool OverlapSkin::inside(Vec3 p) {
 bool OverlapSkin::covers(Vec3 p) { return surface_->identity() || std::fabs(turns(p)) > 0.5; }
 
 double OverlapSkin::distance(Vec3 p) {
-  double best = norm2(p - x(0));
-  near_triangles(
-      tree(),
-      [&](const Box &b) {
-        Vec3 away;
-        for (int k = 0; k < 3; ++k) away[k] = std::max({b.lo[k] - p[k], p[k] - b.hi[k], 0.0});
-        return norm2(away) < best;
-      },
-      [&](uint32_t t) {
-        best = std::min(best, closest_on_triangle(p, corner(t, 0), corner(t, 1), corner(t, 2)).distance2);
-      });
-  return std::sqrt(best);
+  const Triangles triangles{tree(), surface_->tri, x_.data()};
+  return std::sqrt(closest_to(triangles, p, DistanceKey::squared, kFar).key);
 }
 
 Crossed cross_skins(OverlapSkin &a, OverlapSkin &b, double offset, bool yes_or_no,

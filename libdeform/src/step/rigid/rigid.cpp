@@ -313,7 +313,7 @@ void rigid_joint(RigidSet &set, uint32_t joint, double *position, double *rate, 
   if (!set.host.joint)
     fail(DFM_E_UNSUPPORTED, "rigid host '%s' says nothing about its joints", set.host_name.c_str());
   const std::lock_guard one_at_a_time(set.querying);
-  double p, r, e;
+  double p = 0, r = 0, e = 0;
   ask_joint(set, joint,
             [&] { return set.host.joint(set.self, set.state.data(), set.extra.data(), joint, &p, &r, &e); });
   if (position) *position = p;

@@ -151,11 +151,17 @@ double ToolTouch::thickness(const Obstacle &o) {
   return d.shape == DFM_SHAPE_SPHERE || d.shape == DFM_SHAPE_CAPSULE ? 2 * d.radius : HUGE_VAL;
 }
 
-// Whether the two go further, or turn by more, than their rows keep them apart. Rows hold to first order;
-// what turning adds is at most the way times the angle.
-bool ToolTouch::goes_far(const Pair &pair) const {
+// Whether the two go further than any rows keep them apart. Rows hold to first order; what turning adds is at
+// most the way times the angle.
+bool ToolTouch::goes_far_for_size(const Pair &pair) const {
   const double way = ways_[pair.a] + ways_[pair.b], turn = turns_[pair.a] + turns_[pair.b];
-  return way > std::min(kFar * pair.thin, pair.reach) || turn > pair.turn || way * turn > pair.dent;
+  return way > kFar * pair.thin || way * turn > pair.dent;
+}
+
+// The same, or turn by more, than those of this sub-step do.
+bool ToolTouch::goes_far(const Pair &pair) const {
+  return goes_far_for_size(pair) || ways_[pair.a] + ways_[pair.b] > pair.reach ||
+         turns_[pair.a] + turns_[pair.b] > pair.turn;
 }
 
 // The fraction of the sub-step after which the two meet; above 1: they do not.
@@ -180,12 +186,13 @@ bool ToolTouch::stays_out(World &w, StepContext &step) {
     const bool moves = is_moved(*o) || v.moves();
     turns_.push_back(moves ? turn_of(way, v) : 0);
     ways_.push_back(moves ? longest(way, v, turns_.back()) : 0);
+    reach_[o->slot] = ways_.back() + offset_;
   }
+  find_near(step);
   double first = HUGE_VAL;
-  if (std::ranges::any_of(pairs_, [&](const Pair &pair) { return !pair.jaw && goes_far(pair); }))
-    each_pair(w, step, [&](const Pair &pair, ToolShape &a, ToolShape &b, Side, Side) {
-      if (!pair.jaw && goes_far(pair)) first = std::min(first, meeting(w, step, pair, a, b));
-    });
+  each_pair(w, step, [&](const Pair &pair, ToolShape &a, ToolShape &b, Side, Side) {
+    if (!pair.jaw && goes_far(pair)) first = std::min(first, meeting(w, step, pair, a, b));
+  });
   if (!(first <= 1) || !(step.h > kMinSubstep * step.length.planned) || !may_repeat(w, step)) {
     warn_driven(w, step);
     return true;

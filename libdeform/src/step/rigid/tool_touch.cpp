@@ -72,14 +72,38 @@ bool passes(const Obstacle &a, const Obstacle &b) {
 
 }  // namespace
 
-ToolTouch::ToolTouch(const Memory &m) : islands_(m), next_(m), next_touching_(m) {
-  use_memory(m, start_, tangents_, match_, points_);
+void ToolTouch::Things::start() {
+  slot.clear();
+  corners.clear();
+}
+
+void ToolTouch::Things::add(uint32_t s) {
+  const uint32_t lo = static_cast<uint32_t>(2 * slot.size());
+  corners.insert(corners.end(), {lo, lo, lo + 1});
+  slot.push_back(s);
+}
+
+void ToolTouch::Things::renew(std::span<const ObstacleView> views, std::span<const double> more) {
+  box.resize(8 * slot.size());
+  for (size_t k = 0; k < slot.size(); ++k) {
+    const ObstacleView &v = views[slot[k]];
+    const double r = ball_around(v) + more[slot[k]];
+    store3(&box[8 * k], v.position - Vec3{r, r, r});
+    store3(&box[8 * k + 4], v.position + Vec3{r, r, r});
+  }
+  if (tree.triangles().size() == slot.size()) tree.renew(corners, box.data());
+  else tree.build(corners, box.data());
+}
+
+ToolTouch::ToolTouch(const Memory &m) : moved_(m), still_(m), islands_(m), next_(m), next_touching_(m) {
+  use_memory(m, stack_, start_, tangents_, match_, points_);
   state_.use(m);
 }
 
 void ToolTouch::prepare(World &w, SceneFacts &facts) {
   pairs_.clear();
-  passing_.clear();
+  near_.clear();
+  planar_.clear();
   rows_.clear();  // of bodies that may be gone
   sides_.clear();
   sets_.clear();
@@ -90,52 +114,64 @@ void ToolTouch::prepare(World &w, SceneFacts &facts) {
   offset_ = w.offset;
   for (const auto &t : w.tools)
     if (t->motion.coupled() && t->has_jaws()) sets_.push_back(t->set);
-  const auto wall = [&](uint32_t slot) {
+  side_of_.assign(w.obstacles.size(), {kNone, 0, {}, {}});
+  const auto take_part = [&](uint32_t slot) {
     const Obstacle &o = *w.obstacles[slot];
+    Side &side = side_of_[slot];
+    if (side.tool != kNone) return;
     if (of_tool(o) || is_free(o)) {
-      if (std::find(sets_.begin(), sets_.end(), o.rigid) == sets_.end()) sets_.push_back(o.rigid);
-      return kNone;
+      side.tool = static_cast<size_t>(std::find(sets_.begin(), sets_.end(), o.rigid) - sets_.begin());
+      side.part = o.rigid_body;
+      if (side.tool == sets_.size()) sets_.push_back(o.rigid);
+    } else {
+      side.tool = 0;  // behind the sets, once their number is known
+      side.part = static_cast<uint32_t>(walls_.size());
+      walls_.push_back(slot);
     }
-    const auto at = std::find(walls_.begin(), walls_.end(), slot) - walls_.begin();
-    if (at == std::ssize(walls_)) walls_.push_back(slot);
-    return static_cast<uint32_t>(at);
   };
-  for (uint32_t i = 0; i < w.obstacles.size(); ++i)
+  moved_.start();
+  still_.start();
+  for (uint32_t i = 0; i < w.obstacles.size(); ++i) {
+    const Obstacle &a = *w.obstacles[i];
+    if (a.def.shape != DFM_SHAPE_PLANE) (is_wall(a) ? still_ : moved_).add(i);
     for (uint32_t j = i + 1; j < w.obstacles.size(); ++j) {
-      const Obstacle &a = *w.obstacles[i], &b = *w.obstacles[j];
+      const Obstacle &b = *w.obstacles[j];
       const bool cornerless = kept_apart(a, b) && without_corners(a) && without_corners(b);
       const bool apart = kept_apart(a, b) && !cornerless;
       if (!apart && !cornerless && !passes(a, b)) continue;
       if (!partner_of(a).meets(partner_of(b), w.filters) || belong_together(w, a, b)) continue;
       Pair pair{i, j, {a.id, b.id}};
+      pair.passes = !apart;
       if (!apart) {
-        passing_.push_back(pair);
         for (const Obstacle *const o : {&a, &b})
           if (!is_wall(*o) && (cornerless || !is_free(*o)) && (o == &a ? is_wall(b) : is_wall(a)) &&
               std::find(facts.rigid_alone.begin(), facts.rigid_alone.end(), o->name) ==
                   facts.rigid_alone.end())
             facts.rigid_alone.push_back(o->name);
-        continue;
+      } else {
+        const uint32_t nb = static_cast<uint32_t>(w.bodies.size());
+        pair.law = law_of_zones(w, nb + i, 0, nb + j, 0);
+        pair.frees = !of_tool(a) && !of_tool(b);
+        pair.jaw = is_jaw(a) || is_jaw(b);
+        pair.b_first = b_first(a, b);
+        pair.thin = std::min(thickness(a), thickness(b));
+        pair.dent = std::min(kDent, kNear * pair.thin);
+        take_part(i);
+        take_part(j);
+        facts.rigid_pairs += pair.frees;
+        facts.rigid_rows = true;
+        w.pairs.tool_law.push_back(pair.law);
       }
-      const uint32_t nb = static_cast<uint32_t>(w.bodies.size());
-      pair.law = law_of_zones(w, nb + i, 0, nb + j, 0);
-      pair.frees = !of_tool(a) && !of_tool(b);
-      pair.jaw = is_jaw(a) || is_jaw(b);
-      pair.b_first = b_first(a, b);
-      pair.wall[0] = wall(i);
-      pair.wall[1] = wall(j);
-      pair.thin = std::min(thickness(a), thickness(b));
-      pair.dent = std::min(kDent, kNear * pair.thin);
-      facts.rigid_pairs += pair.frees;
+      if (a.def.shape == DFM_SHAPE_PLANE || b.def.shape == DFM_SHAPE_PLANE)
+        planar_.push_back(static_cast<uint32_t>(pairs_.size()));
       pairs_.push_back(pair);
     }
-  facts.rigid_rows = !pairs_.empty();
-  for (const Pair &pair : pairs_) w.pairs.tool_law.push_back(pair.law);
-  for (const auto *const list : {&pairs_, &passing_})
-    for (const Pair &pair : *list)
-      for (const uint32_t slot : {pair.a, pair.b})
-        if (ObstacleMesh *const mesh = w.obstacles[slot]->mesh.get(); mesh && !mesh->tree)
-          mesh->make_tree(w.meters.obstacles.memory());
+  }
+  for (const uint32_t slot : walls_) side_of_[slot].tool = sets_.size();
+  for (const Pair &pair : pairs_)
+    for (const uint32_t slot : {pair.a, pair.b})
+      if (ObstacleMesh *const mesh = w.obstacles[slot]->mesh.get(); mesh && !mesh->tree)
+        mesh->make_tree(w.meters.obstacles.memory());
 }
 
 // Of the places of a row against each other, by these velocities of their bodies.
@@ -248,11 +284,10 @@ Vec3 ToolTouch::belt(const Side &side) const {
   return m.set ? Vec3{} : m.belt[side.part];
 }
 
-double ToolTouch::fastest(const ToolShape &shape, const Side &side, const ToolShape &other) const {
+// m/s, of the points of it that are within `reach` around a place.
+double ToolTouch::fastest(const Side &side, Vec3 around, double reach) const {
   const double *const v = &sides_[side.tool].free[6 * size_t{side.part}];
-  const double arm = shape.endless() ? norm(other.position() - center(side)) + other.reach()
-                                     : norm(shape.position() - center(side)) + shape.reach();
-  return norm(load3(v)) + norm(load3(v + 3)) * arm;
+  return norm(load3(v)) + norm(load3(v + 3)) * (norm(around - center(side)) + reach);
 }
 
 void ToolTouch::add_row(const Pair &pair, Name name, Side a, Side b, const Place &place, Vec3 normal,
@@ -303,7 +338,10 @@ bool ToolTouch::cull_facing(ToolShape &a, ToolShape &b, double far, bool flat) {
 // Adds rows of the corners of each against the other, and of edges that cross. Returns m, the depth of the
 // deepest of them; 0: none is inside.
 double ToolTouch::add_rows(Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b) {
-  const double reach = pair.reach = kReach * h_ * (fastest(a, at_a, b) + fastest(b, at_b, a)) + offset_;
+  const ToolShape &near_a = a.endless() ? b : a, &near_b = b.endless() ? a : b;
+  const double speeds =
+      fastest(at_a, near_a.position(), near_a.reach()) + fastest(at_b, near_b.position(), near_b.reach());
+  const double reach = pair.reach = kReach * h_ * speeds + offset_;
   const auto turns = [&](const Side &side) {
     return h_ * norm(load3(&sides_[side.tool].free[6 * size_t{side.part} + 3]));
   };
@@ -348,25 +386,35 @@ double ToolTouch::add_rows(Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Si
   return deepest;
 }
 
-ToolTouch::Side ToolTouch::side_of(const Obstacle &o, uint32_t wall) const {
-  Side out{};
-  if (wall != kNone) {
-    out.tool = sides_.size() - 1;
-    out.part = wall;
-    return out;
-  }
-  while (sides_[out.tool].set != o.rigid) ++out.tool;
-  out.part = o.rigid_body;
-  return out;
+bool ToolTouch::is_of_set(const Obstacle &o) const { return side_of_[o.slot].tool < sets_.size(); }
+
+// Adds the pairs of which the balls around the two meet that are larger by reach_.
+void ToolTouch::find_near(const StepContext &step) {
+  for (Things *const things : {&moved_, &still_}) things->renew(step.obstacle_views, reach_);
+  const auto add = [&](uint32_t a, uint32_t b) {
+    if (a > b) std::swap(a, b);
+    const auto at = std::lower_bound(
+        pairs_.begin(), pairs_.end(), std::pair(a, b),
+        [](const Pair &p, const std::pair<uint32_t, uint32_t> &of) { return std::pair(p.a, p.b) < of; });
+    if (at != pairs_.end() && at->a == a && at->b == b)
+      near_.push_back(static_cast<uint32_t>(at - pairs_.begin()));
+  };
+  near_pairs(moved_.tree, still_.tree, 0, stack_,
+             [&](uint32_t p, uint32_t q, double) { add(moved_.at(p), still_.at(q)); });
+  near_self_pairs(moved_.tree, 0, stack_,
+                  [&](uint32_t p, uint32_t q, double) { add(moved_.at(p), moved_.at(q)); });
+  std::sort(near_.begin(), near_.end());
+  near_.erase(std::unique(near_.begin(), near_.end()), near_.end());
 }
 
 // Calls f(pair, the two shapes, their sides) for all pairs that may touch and of which one yields.
 void ToolTouch::each_pair(const World &w, const StepContext &step, const Visit &f) {
-  for (Pair &pair : pairs_) {
+  for (const uint32_t k : near_) {
+    Pair &pair = pairs_[k];
     const Obstacle &a = *w.obstacles[pair.a], &b = *w.obstacles[pair.b];
     const ObstacleView &va = step.obstacle_views[a.slot], &vb = step.obstacle_views[b.slot];
-    if (!ToolShape::takes_part(va) || !ToolShape::takes_part(vb)) continue;
-    const Side at_a = side_of(a, pair.wall[0]), at_b = side_of(b, pair.wall[1]);
+    if (pair.passes || !ToolShape::takes_part(va) || !ToolShape::takes_part(vb)) continue;
+    const Side &at_a = side_of_[pair.a], &at_b = side_of_[pair.b];
     if (!sides_[at_a.tool].gives(b) && !sides_[at_b.tool].gives(a)) continue;
     shapes_[0].take(va, a.mesh.get());
     shapes_[1].take(vb, b.mesh.get());
@@ -477,12 +525,19 @@ bool ToolTouch::begin(World &w, StepContext &step) {
   rows_.clear();
   off_ = left_ = 0;
   offset_ = w.offset;
-  if (!passing_.empty()) warn_passing(w, step);
-  if (sets_.empty()) return true;
+  if (sets_.empty() && pairs_.empty()) return true;
   h_ = step.h;
   planned_ = step.length.planned;
   strong_ = 1;
   take_sets(w, step);
+  for (const uint32_t k : near_) pairs_[k].reach = pairs_[k].turn = 0;
+  near_ = planar_;
+  reach_.assign(w.obstacles.size(), offset_);
+  for (size_t i = 0; i < reach_.size(); ++i)
+    if (const ObstacleView &v = step.obstacle_views[i]; side_of_[i].tool != kNone)
+      reach_[i] += kReach * h_ * fastest(side_of_[i], v.position, ball_around(v));
+  find_near(step);
+  warn_passing(w, step);
   each_pair(w, step, [&](Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b) {
     const double deep = add_rows(pair, a, b, at_a, at_b);
     if (!pair.jaw && inside(a, b, deep)) warn_deep(w, pair, deep, false);

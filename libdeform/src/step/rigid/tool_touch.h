@@ -37,6 +37,7 @@
 #include "contact/store.h"
 #include "core/disjoint_sets.h"
 #include "friction/laws.h"
+#include "geometry/box_tree.h"
 #include "math/vec3.h"
 #include "step/rigid/tool_shape.h"
 
@@ -55,6 +56,7 @@ class ToolTouch {
   explicit ToolTouch(const Memory &memory);
   // Called after a change of bodies or rules: finds which pairs may touch, and their laws.
   void prepare(World &w, SceneFacts &facts);
+  size_t near() const { return near_.size(); }  // pairs that were looked at in the last sub-step
 
   // Called before detection: finds the rows of this sub-step, and adds to the sets' velocities what their
   // impulses of the last one do. Returns false if the sub-step must be repeated, shorter (StepLength).
@@ -109,12 +111,25 @@ class ToolTouch {
     uint32_t a, b;
     uint64_t id[2];
     uint32_t law = 0;
-    bool frees = true, jaw = false;     // none is of a tool; one is a jaw
-    bool b_first = false;               // reports have b first
-    uint32_t wall[2] = {kNone, kNone};  // number among walls_; kNone: it is in a set
-    double thin = 0;                    // m, least thickness of the two
-    double dent = 0;  // m: sharp edges that are further on the wrong side do not touch there
-    double reach = HUGE_VAL, turn = HUGE_VAL;  // m, rad: how far its rows of this sub-step keep the two apart
+    bool passes = false;             // nothing keeps the two apart, and no filter excludes them
+    bool frees = true, jaw = false;  // none is of a tool; one is a jaw
+    bool b_first = false;            // reports have b first
+    double thin = 0;                 // m, least thickness of the two
+    double dent = 0;                 // m: sharp edges that are further on the wrong side do not touch there
+    double reach = 0, turn = 0;      // m, rad: how far its rows of this sub-step keep the two apart
+  };
+  // Of a kind of thing, planes aside, which are near everything.
+  struct Things {
+    std::vector<uint32_t> slot;
+    BoxTree tree;
+    Array<double> box;        // [n,2,4] m, least and largest corner of each one's box
+    Array<uint32_t> corners;  // [n,3] of a triangle that has this box
+    explicit Things(const Memory &m) : tree(m), box(m), corners(m) {}
+    void start();
+    void add(uint32_t obstacle);
+    // Around balls that are larger by more[obstacle].
+    void renew(std::span<const ObstacleView> views, std::span<const double> more);
+    uint32_t at(uint32_t place) const { return slot[tree.triangles()[place]]; }
   };
   struct Row {
     const Pair *pair;
@@ -170,8 +185,9 @@ class ToolTouch {
   double add_rows(Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b);
   void add_row(const Pair &pair, Name name, Side a, Side b, const Place &place, Vec3 normal, double gap,
                double reach);
+  void find_near(const StepContext &step);
   static uint64_t key_of(const uint64_t pair[2], Name name);
-  double fastest(const ToolShape &shape, const Side &side, const ToolShape &other) const;
+  double fastest(const Side &side, Vec3 around, double reach) const;
   Vec3 center(const Side &side) const;
   void list_jaws(Moved &m, uint32_t groups);
   void straighten(Moved &m) const;
@@ -208,6 +224,7 @@ class ToolTouch {
   static void clean_response(Moved &m, uint32_t group);
   // tool_swept.cpp
   static double thickness(const Obstacle &o);
+  bool goes_far_for_size(const Pair &pair) const;
   bool goes_far(const Pair &pair) const;
   double meeting(const World &w, const StepContext &step, const Pair &pair, ToolShape &a, ToolShape &b) const;
   // tool_warnings.cpp
@@ -217,7 +234,7 @@ class ToolTouch {
   void warn_passing(const World &w, const StepContext &step);
   bool reported(const Pair &pair) const;
   bool inside(const ToolShape &a, const ToolShape &b, double deep) const;
-  Side side_of(const Obstacle &o, uint32_t wall) const;
+  bool is_of_set(const Obstacle &o) const;
   void take_sets(World &w, StepContext &step);
   // tool_rub.cpp
   void take_last(const World &w, const StepContext &step);
@@ -235,13 +252,18 @@ class ToolTouch {
   double h_ = 0, offset_ = 0;
   double planned_ = 0;                // s, the sub-step before it was shortened
   std::vector<double> ways_, turns_;  // [obstacles] m, of any point in the sub-step; rad
+  std::vector<double> reach_;         // [obstacles] m, that find_near() looks around each
   double off_ = 0;                    // m, that places with load or joints may be off after a solve
   double left_ = 0;                   // m/s along normals, that the last solve has left
   double strong_ = 1;                 // of the answer without joints, that places give where a motor holds
-  std::vector<Pair> pairs_,
-      passing_;                   // passing: nothing keeps the two apart, and no filter excludes them
+  std::vector<Pair> pairs_;           // by a, then b
+  std::vector<uint32_t> near_;        // numbers of those that may be near each other in this sub-step
+  std::vector<uint32_t> planar_;      // of those with a plane
+  Things moved_, still_;
+  Array<PairOfTriangles> stack_;  // scratch
   std::vector<RigidSet *> sets_;  // that take part
   std::vector<uint32_t> walls_;   // places in World::obstacles of those in no set of these
+  std::vector<Side> side_of_;     // [obstacles] of those that take part
   std::vector<Moved> sides_;      // of this sub-step; kept for their memory, as shapes_ are
   ToolShape shapes_[2];
   std::vector<Row> rows_;

@@ -21,16 +21,6 @@ constexpr uint32_t kLooks = 16;   // pieces of an edge whose ends are tested
 constexpr double kDeep = 0.02;    // of the smaller one's reach: a smaller depth is not reported
 constexpr uint64_t kSeldom = 16;  // steps between two tests of driven tools against triangles
 
-// Whether the bounding spheres of the two, or that of one and a plane, do not meet.
-bool balls_apart(const ObstacleView &a, const ObstacleView &b) {
-  if (a.shape == Shape::plane && b.shape == Shape::plane) return true;
-  if (a.shape == Shape::plane)
-    return dot(rotate(a.rotation, {0, 0, 1}), b.position - a.position) > ball_around(b);
-  if (b.shape == Shape::plane) return balls_apart(b, a);
-  const double far = ball_around(a) + ball_around(b);
-  return norm2(a.position - b.position) > far * far;
-}
-
 // m, depth of the center of a shape without corners inside another one; 0: it is outside.
 double center_depth(const ToolShape &a, const ToolShape &b) {
   double deepest = 0;
@@ -80,11 +70,12 @@ bool ToolTouch::reported(const Pair &pair) const {
 // Warns, once for each pair, of rigid bodies of other hosts that pass through something. A host with a world
 // of its own may let bodies overlap by a little.
 void ToolTouch::warn_passing(const World &w, const StepContext &step) {
-  for (const Pair &pair : passing_) {
+  for (const uint32_t k : near_) {
+    const Pair &pair = pairs_[k];
+    if (!pair.passes) continue;
     const Obstacle &a = *w.obstacles[pair.a], &b = *w.obstacles[pair.b];
     const ObstacleView &va = step.obstacle_views[a.slot], &vb = step.obstacle_views[b.slot];
-    if (!ToolShape::takes_part(va) || !ToolShape::takes_part(vb) || balls_apart(va, vb) || reported(pair))
-      continue;
+    if (!ToolShape::takes_part(va) || !ToolShape::takes_part(vb) || reported(pair)) continue;
     ToolShape shape_a(va, a.mesh.get()), shape_b(vb, b.mesh.get());
     const bool corners = shape_a.has_corners() || shape_b.has_corners();
     const double deep = corners ? depth(shape_a, shape_b, true) : center_depth(shape_a, shape_b);
@@ -103,8 +94,8 @@ void ToolTouch::warn_passing(const World &w, const StepContext &step) {
 void ToolTouch::warn_deep(const World &w, const Pair &pair, double deep, bool driven) {
   if (reported(pair)) return;
   reported_.push_back({pair.id[0], pair.id[1]});
-  const bool first = pair.wall[0] != kNone;
-  const Obstacle &own = *w.obstacles[first ? pair.b : pair.a], &other = *w.obstacles[first ? pair.a : pair.b];
+  const Obstacle &a = *w.obstacles[pair.a], &b = *w.obstacles[pair.b];
+  const Obstacle &own = is_of_set(a) ? a : b, &other = is_of_set(a) ? b : a;
   if (driven)
     w.context->warn({"tool", own.name.c_str()},
                     " is %.3g m deep in '%s' at %.6g s and goes through it, because it goes exactly where it "
@@ -126,23 +117,25 @@ void ToolTouch::warn_driven(const World &w, const StepContext &step) {
            (m.gives(to) && std::any_of(m.jaws.begin(), m.jaws.end(),
                                        [&](const Moved::Jaw &jaw) { return jaw.part == side.part; }));
   };
-  for (const Pair &pair : pairs_) {
+  for (const uint32_t k : near_) {
+    const Pair &pair = pairs_[k];
+    if (pair.passes) continue;
     const Obstacle &a = *w.obstacles[pair.a], &b = *w.obstacles[pair.b];
-    const bool wall_a = pair.wall[0] != kNone, wall_b = pair.wall[1] != kNone;
-    const Side at_a = side_of(a, pair.wall[0]), at_b = side_of(b, pair.wall[1]);
+    const bool wall_a = !is_of_set(a), wall_b = !is_of_set(b);
+    const Side &at_a = side_of_[pair.a], &at_b = side_of_[pair.b];
     if ((!wall_a && can_move(at_a, b)) || (!wall_b && can_move(at_b, a)) || reported(pair)) continue;
     const ObstacleView &va = step.obstacle_views[a.slot], &vb = step.obstacle_views[b.slot];
     if (!ToolShape::takes_part(va) || !ToolShape::takes_part(vb)) continue;
     const bool wall = wall_a || wall_b, mesh = va.surface || vb.surface;
-    if (wall && (cuts(w, wall_a ? b : a) || balls_apart(va, vb) || (mesh && w.step_count % kSeldom != 0)))
-      continue;
+    if (wall && (cuts(w, wall_a ? b : a) || (mesh && w.step_count % kSeldom != 0))) continue;
     ToolShape shape_a(va, a.mesh.get()), shape_b(vb, b.mesh.get());
     const double deep = depth(shape_a, shape_b, !(wall && mesh));
     if (wall) {
       if (inside(shape_a, shape_b, deep)) warn_deep(w, pair, deep, true);
       continue;
     }
-    if (!(deep > offset_) && !(goes_far(pair) && meeting(w, step, pair, shape_a, shape_b) <= 1)) continue;
+    if (!(deep > offset_) && !(goes_far_for_size(pair) && meeting(w, step, pair, shape_a, shape_b) <= 1))
+      continue;
     reported_.push_back({pair.id[0], pair.id[1]});
     w.context->warn(
         "tools '%s' and '%s' have met at %.6g s%s and pass each other, because both go exactly where they "

@@ -7,7 +7,6 @@
 #include "state/obstacle.h"
 #include "state/world.h"
 #include "step/context.h"
-#include "step/held_in.h"
 #include "step/messages.h"
 #include "step/sides.h"
 #include "step/rigid/tool_touch.h"

@@ -8,7 +8,6 @@
 #include "state/obstacle.h"
 #include "state/world.h"
 #include "step/context.h"
-#include "step/held_in.h"
 #include "step/messages.h"
 #include "step/sides.h"
 #include "step/watch/energy_watch.h"
