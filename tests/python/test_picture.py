@@ -222,7 +222,11 @@ class View(unittest.TestCase):
                 np.testing.assert_allclose(thing.pose, solid.pose, atol=1e-6)
             self.assertEqual(set(scene.present), {1, 2, 3, 4})
         self.assertEqual(scene.things[3].half_size, np.float32([0.05, 0.1, 0.02]).tolist())
-        self.assertEqual(webgl._values(run, np.array([0, run.value_range()[1]])).tolist(), [1, 255])
+        span = run.value_range()
+        self.assertEqual(webgl._values("speed", span, np.array([0, span[1]])).tolist(), [1, 255])
+        with mock.patch.object(deform.Run, "value_range", return_value=span) as asked:
+            webgl.document(run)
+        self.assertLess(asked.call_count, len(run.frames))
 
     def test_cut_body_is_told_again(self):
         with deform.World() as world:
@@ -276,6 +280,7 @@ class View(unittest.TestCase):
             np.testing.assert_allclose(film.times, np.arange(11) / 100, atol=1e-9)
             np.testing.assert_allclose(film.positions("ball")[-1], body.positions, atol=1e-7)
             self.assertGreater(film.top(), 0)
+            self.assertEqual(film.top(), max(frame.values["ball"].max() for frame in film.frames))
             self.assertEqual((film.steps, film.frames[-1].contacts), (100, int(world.stats.contacts)))
             body.remove()
             with self.assertRaisesRegex(deform.ArgumentError, "body 'ball' is gone"):

@@ -308,10 +308,15 @@ def scaled(values: np.ndarray | None, value_range: tuple[float, float], color: s
     return np.where(values == 0, np.nan, out) if color == "contact" else out
 
 
-def ends(value_range: Sequence[float] | None, values: Iterable[np.ndarray | None]) -> tuple[float, float]:
-    """The values at the ends of the colors: those given, or 0 and the largest."""
+def largest(values: Iterable[np.ndarray | None]) -> float:
+    """0 where there is none."""
+    return max((float(v.max(initial=0)) for v in values if v is not None), default=0.0)
+
+
+def ends(value_range: Sequence[float] | None, top: float) -> tuple[float, float]:
+    """The values at the ends of the colors: those given, or 0 and top."""
     if value_range is None:
-        return 0.0, max((float(v.max(initial=0)) for v in values if v is not None), default=0.0)
+        return 0.0, top
     low, high = vector(value_range, "color_range", 2)
     if not low < high:
         raise ArgumentError(f"color_range is {low:g} to {high:g}; the second value must be larger",
@@ -329,7 +334,7 @@ def picture(world: World, *, size: tuple[int, int] = (960, 720), color: str = "b
     values = [body_values(b, color) for b in bodies]
     if all(v is None for v in values):
         color = "body"
-    span = ends(color_range, values)
+    span = ends(color_range, largest(values))
     surfaces = [(b.positions, b.triangles, palette(i), scaled(v, span, color))
                 for i, (b, v) in enumerate(zip(bodies, values))]
     return draw(surfaces, solids(world), size=size, eye=eye, look_at=look_at, color=color, value_range=span,
