@@ -189,6 +189,31 @@ class Pictures(unittest.TestCase):
             np.testing.assert_array_equal(deform.picture.upright_of(world).at(0), [0, -1, 0])
             self.assertIsInstance(world.picture(size=(8, 8)), deform.Picture)
 
+    def test_renderers_of_sizes_that_are_not_drawn_any_more_go(self):
+        with deform.World() as world:
+            for width in range(20, 28):
+                world.picture(size=(width, 16))
+            self.assertLessEqual(len(deform.picture._renderers), 4)
+            self.assertEqual(world.picture(size=(20, 16)).rgb.shape, (16, 20, 3))
+
+    def test_short_memory_is_told(self):
+        """Of a process that may not have more."""
+        said = subprocess.run([sys.executable, "-B", "-c", """
+import ctypes, resource
+import deform
+with deform.World() as world:
+    world.picture(size=(8, 8))
+picture, = deform.picture._renderers.values()
+native, line = deform.picture._native(), b"x" * 200_000_000
+size = 4096 * int(open("/proc/self/statm").read().split()[0])
+resource.setrlimit(resource.RLIMIT_AS, (size + 100_000_000,) * 2)
+native.deform_picture_begin(picture, (ctypes.c_double * 3)(0, 0, 1), 0)
+native.deform_picture_text(picture, line)
+why = ctypes.create_string_buffer(100)
+print(native.deform_picture_draw(picture, (ctypes.c_uint8 * 192)(), why, 100), why.value.decode())
+"""], capture_output=True, text=True)
+        self.assertEqual(said.stdout, "0 no memory for a picture of this size\n", said.stderr)
+
     def test_frames_of_a_run(self):
         run = dropped()
         first, last = run.picture(0, size=(160, 120)), run.picture(-1, size=(160, 120))

@@ -26,6 +26,7 @@ _renderers: dict[tuple[int, int], int] = {}
 _forked = False  # from a process that has drawn
 _MODULE = "libdeform_python.so"
 _LARGEST = 8192   # pixels, of the renderer
+_KEPT = 4         # renderers, of the sizes that were drawn last
 _THROUGH = 0.45   # of a contact patch that something hides
 _ROUNDING = 1e-10  # strains, and displacements for coordinates of 1 m, that are drawn as zero
 # what colors may mean: title and unit
@@ -57,7 +58,7 @@ def _native() -> Any:
         module = ctypes.CDLL(str(path))
         p, u, t, d = ctypes.c_void_p, ctypes.c_uint32, ctypes.c_char_p, ctypes.c_double
         for name, result, arguments in (
-                ("create", p, [u, u, p, ctypes.c_size_t]), ("palette", None, [u, p]),
+                ("create", p, [u, u, p, ctypes.c_size_t]), ("destroy", None, [p]), ("palette", None, [u, p]),
                 ("map", None, [u, u, p]), ("begin", None, [p, p, u]), ("legend", None, [p, u, d, d, t, t]),
                 ("surface", None, [p, u, p, u, p, p, p, d]), ("shape", None, [p, u, p, p, p]),
                 ("camera", None, [p, p, p]), ("text", None, [p, t]),
@@ -217,28 +218,31 @@ def draw(surfaces: Iterable[tuple[Any, Any, Sequence[float], Any]], obstacles: I
         raise ArgumentError("a camera has both eye and look_at", "DFM_E_ARG")
     native, why = _native(), ctypes.create_string_buffer(512)
     with _lock:
-        picture = _renderers.get(key) or native.deform_picture_create(width, height, why, len(why))
+        picture = _renderers.pop(key, None) or native.deform_picture_create(width, height, why, len(why))
         if not picture:
             raise UnsupportedError(f"no pictures: {why.value.decode()}", "DFM_E_UNSUPPORTED")
         _renderers[key] = picture
+        if len(_renderers) > _KEPT:
+            native.deform_picture_destroy(_renderers.pop(next(iter(_renderers))))
         native.deform_picture_begin(picture, vector(upright.at(t), "up"), upright.tilts)
         if color in COLORS:
             title, unit = (word.encode() for word in COLORS[color])
             native.deform_picture_legend(picture, int(color == "displacement"), *value_range, title, unit)
-        for points, triangles, own, values in surfaces:
+        others = list(obstacles)
+        meshes = [(solid.points, solid.triangles, (0.72, 0.73, 0.75), None) for solid in others
+                  if solid.points is not None]
+        read = []  # while the picture is drawn
+        for points, triangles, own, values in [*surfaces, *meshes]:
             xyz = np.ascontiguousarray(points, dtype=np.float64)
             tri = np.ascontiguousarray(triangles, dtype=np.uint32)
             scalar = None if values is None else np.ascontiguousarray(values, dtype=np.float32)
+            read.append((xyz, tri, scalar))
             native.deform_picture_surface(picture, len(xyz), xyz.ctypes.data, len(tri), tri.ctypes.data,
                                           vector(own, "color"),
                                           None if scalar is None else scalar.ctypes.data,
                                           _THROUGH if color == "contact" else 0.0)
-        for solid in obstacles:
-            if solid.points is not None and solid.triangles is not None:
-                native.deform_picture_surface(picture, len(solid.points), solid.points.ctypes.data,
-                                              len(solid.triangles), solid.triangles.ctypes.data,
-                                              vector((0.72, 0.73, 0.75), "color"), None, 0.0)
-            else:
+        for solid in others:
+            if solid.points is None:
                 native.deform_picture_shape(picture, solid.kind, vector(solid.pose, "pose", 7),
                                             vector(solid.axis, "axis"), vector(solid.size, "size"))
         if eye is not None:
