@@ -20,7 +20,7 @@ import numpy as np
 
 import deform
 from deform._library import refuse_foreign
-from deform.study import __main__ as command_line
+from deform.study import __main__ as command_line, plots
 from deform.study.design import points
 from deform.study.engine import Engine, Failed, Results
 from deform.study.executors import Dask
@@ -441,6 +441,18 @@ class Kills(InAFolder):
 
 
 class Outputs(InAFolder):
+    def test_map_of_points_that_repeat_shows_all_runs(self):
+        try:
+            from matplotlib.collections import PathCollection
+        except ImportError:
+            self.skipTest("no matplotlib")
+        rows = [{"mu": mu, "v": v, "slid": i, "state": "done"}
+                for i, (mu, v) in enumerate([(0.1, 1), (0.2, 2), (0.1, 1), (0.2, 2)])]
+        parameters = read_study(self.study()).parameters
+        shown = plots.maps(plots.Columns(rows, parameters, ["slid"], {})).axes[0].collections[0]
+        self.assertIsInstance(shown, PathCollection)
+        self.assertEqual(shown.get_array().tolist(), [0, 1, 2, 3])
+
     def test_files_of_others_stay_as_they_are(self):
         study = self.study(design={"method": "random", "runs": 1})
         for name, options in (("sweep.csv", ()), ("sweep.html", ()), ("curves.png", ()), ("runs.jsonl", ()),
