@@ -493,6 +493,9 @@ class Outputs(InAFolder):
         self.assertEqual(of_one_kind([0.5, "auto", None]), ["0.5", "auto", None])
 
     def test_command_writes_tables_and_page(self):
+        self.out.mkdir()
+        (self.out / "sweep.parquet").write_bytes(b"of an earlier deform sweep")
+        (self.out / "runs.jsonl").write_bytes(bytes(300))  # as a loss of power may leave it
         said = self.command("sweep", self.study(), "--out", self.out, "--workers", "2")
         self.assertIn("16 runs: 16 done, 0 failed", said.stdout)
         with open(self.out / "sweep.csv", newline="") as file:
@@ -504,6 +507,9 @@ class Outputs(InAFolder):
         self.assertNotIn("http", page)
         for name in "curves", "map", "parallel":
             self.assertEqual((self.out / f"{name}.png").read_bytes()[1:4], b"PNG")
+        self.command("sweep", self.study(design={"method": "random", "runs": 1}), "--out", self.out)
+        self.assertEqual(sorted(path.name for path in self.out.iterdir()),
+                         ["runs.jsonl", "sweep.csv", "sweep.html"])
 
     def test_parquet_holds_units(self):
         study = self.study(design={"method": "sobol", "runs": 4})

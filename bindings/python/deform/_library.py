@@ -9,7 +9,7 @@ import contextlib
 import ctypes
 import os
 import pathlib
-from typing import Any
+from typing import Any, Mapping, Sequence
 
 from . import _abi
 
@@ -198,7 +198,7 @@ def refuse_foreign(path: pathlib.Path, mark: str) -> None:
             found += file.read()
     except (FileNotFoundError, NotADirectoryError):
         return
-    if found and mark.encode() not in found:
+    if found.strip(b"\0") and mark.encode() not in found:  # zeros: a loss of power in the first write
         raise FileError(f"{path}: another program wrote this file, or an earlier deform, and it stays as it "
                         f"is; give another folder (--out), or move the file", "DFM_E_IO")
 
@@ -216,6 +216,16 @@ def write_whole(path: pathlib.Path, data: bytes, mark: str = "") -> None:
     finally:
         with contextlib.suppress(OSError):
             part.unlink()
+
+
+def clear_own(folder: pathlib.Path, marks: Mapping[str, str], written: Sequence[pathlib.Path]) -> None:
+    """Takes away what an earlier call has left, which would look like results of this one. marks: of its
+    files, by their names; a file of another program stays."""
+    for name, mark in marks.items():
+        if folder / name not in written:
+            with contextlib.suppress(FileError):
+                refuse_foreign(folder / name, mark)
+                (folder / name).unlink(missing_ok=True)
 
 
 def read_text(function: Any, *arguments: Any) -> str:

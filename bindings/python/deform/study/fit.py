@@ -10,7 +10,7 @@ from typing import Any, Callable, Mapping, Sequence
 import numpy as np
 
 from .._command import Table
-from .._library import ArgumentError, Error, UnsupportedError, refuse_foreign, write_whole
+from .._library import ArgumentError, Error, UnsupportedError, clear_own, refuse_foreign, write_whole
 from .._values import finite_or_none
 from . import plots
 from .engine import Failed
@@ -67,6 +67,7 @@ class Fit(Table):
             sentences.append(str(missing))
         write_whole(written[1], page(f"Fit {self.study.name}", sentences, figures,
                                      [table(self, self.columns, {})]), MARKS["fit.html"])
+        clear_own(self.folder, MARKS, written)
         return written
 
 

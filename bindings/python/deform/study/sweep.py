@@ -6,7 +6,7 @@ from contextlib import ExitStack, closing
 from typing import Any, Sequence
 
 from .._command import Table
-from .._library import ArgumentError, UnsupportedError, write_whole
+from .._library import ArgumentError, UnsupportedError, clear_own, write_whole
 from . import plots, tables
 from .design import points
 from .executors import executor as named_executor
@@ -59,6 +59,7 @@ class Sweep(Table):
         written.append(self.folder / "sweep.html")
         write_whole(written[-1], page(f"Sweep {self.study.name}", sentences, figures,
                                       [table(self, self.columns, self.units)]), MARKS["sweep.html"])
+        clear_own(self.folder, MARKS, written)
         if parquet:
             written.append(self.folder / "sweep.parquet")
             tables.write_parquet(written[-1], self, self.columns, self.units, MARKS["sweep.parquet"])
