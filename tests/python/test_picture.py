@@ -130,6 +130,13 @@ class Pictures(unittest.TestCase):
             with self.assertRaisesRegex(deform.ArgumentError, "second value must be larger"):
                 world.picture(color="speed", color_range=(1, 1))
 
+    def test_stress_is_that_of_the_nearest_point_far_from_the_origin(self):
+        random = np.random.default_rng(1)
+        points, surfels = 0.1 * random.random((2000, 3)), 0.1 * random.random((500, 3))
+        near, far = (deform.picture._nearest(mock.Mock(points=points + away, positions=surfels + away))
+                     for away in (0, 1e5))
+        np.testing.assert_array_equal(near, far)
+
     def test_without_its_module_says_what_builds_it(self):
         with mock.patch.multiple(deform.picture, _module=None, _MODULE="libdeform_gone.so"):
             with self.assertRaisesRegex(deform.UnsupportedError, "gone.so, .* is not there: `make wheel`"):
@@ -216,6 +223,10 @@ print(native.deform_picture_draw(picture, (ctypes.c_uint8 * 192)(), why, 100), w
 
     def test_frames_of_a_run(self):
         run = dropped()
+        run.camera = (0, -1, 0.4), (0, 0, 0.1)
+        with self.assertRaisesRegex(deform.ArgumentError, "a camera has both eye and look_at"):
+            run.picture(look_at=(0, 0, 1))
+        run.camera = None
         first, last = run.picture(0, size=(160, 120)), run.picture(-1, size=(160, 120))
         self.assertFalse(np.array_equal(first.rgb, last.rgb))
         with tempfile.TemporaryDirectory(suffix=" with space") as folder:

@@ -257,7 +257,8 @@ def draw(surfaces: Iterable[tuple[Any, Any, Sequence[float], Any]], obstacles: I
 
 def _nearest(body: Any) -> np.ndarray:
     """The point that is nearest to each surfel, [nsurfel]."""
-    points, surfels = body.points, body.positions
+    origin = body.points[:1]  # squares of places far from it have no digits for distances
+    points, surfels = body.points - origin, body.positions - origin
     rows = max(1, 4_000_000 // max(len(points), 1))
     squares = (points**2).sum(axis=1)
     return np.concatenate([(squares - 2 * surfels[i:i + rows] @ points.T).argmin(axis=1)

@@ -225,7 +225,7 @@ class Run:
                 look_at: Any = None) -> Picture:
         """A frame, drawn; negative numbers count from the end."""
         shown, span = self.frames[frame], self.value_range()
-        if eye is None and self.camera is not None:
+        if eye is None and look_at is None and self.camera is not None:
             eye, look_at = self.camera
         surfaces = [(shown.positions[name], shown.triangles[name], palette(i),
                      scaled(shown.values[name], span, self.color)) for i, name in enumerate(self.triangles)]
