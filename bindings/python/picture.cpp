@@ -121,8 +121,8 @@ PICTURE_API void deform_picture_surface(void *picture, uint32_t n, const double 
                                         const uint32_t *tri, const double *rgb, const float *scalar,
                                         double through) {
   add(picture, [&](Picture &p) {
-    p.scene.surfaces.push_back({xyz, n, tri, ntri, {float(rgb[0]), float(rgb[1]), float(rgb[2])}, scalar,
-                                float(through)});
+    p.scene.surfaces.push_back(
+        {xyz, n, tri, ntri, {float(rgb[0]), float(rgb[1]), float(rgb[2])}, scalar, float(through)});
   });
 }
 
