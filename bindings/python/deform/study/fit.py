@@ -15,7 +15,7 @@ from .._values import finite_or_none
 from . import plots
 from .engine import Failed
 from .executors import Dask, Local, executor as named_executor
-from .page import page, table
+from .page import page
 from .spec import Residual, Study, read_study
 from .statistics import Spread
 from .store import require_posix
@@ -65,8 +65,8 @@ class Fit(Table):
             write_whole(written[-1], figures["fit"], plots.MARK)
         except UnsupportedError as missing:
             sentences.append(str(missing))
-        write_whole(written[1], page(f"Fit {self.study.name}", sentences, figures,
-                                     [table(self, self.columns, {})]), MARKS["fit.html"])
+        write_whole(written[1], page(f"Fit {self.study.name}", sentences, figures, self, {}),
+                    MARKS["fit.html"])
         clear_own(self.folder, MARKS, written)
         return written
 
