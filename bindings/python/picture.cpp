@@ -33,8 +33,8 @@ struct Picture {
   bool added = true;  // all that was to be; false where memory was short
 };
 
-int refuse(const std::string &sentence, char *why, size_t capacity) {
-  std::snprintf(why, capacity, "%s", sentence.c_str());
+int refuse(const char *sentence, char *why, size_t capacity) {
+  std::snprintf(why, capacity, "%s", sentence);
   return 0;
 }
 
@@ -73,7 +73,7 @@ PICTURE_API void *deform_picture_create(uint32_t width, uint32_t height, char *w
     picture->renderer = render::Renderer::create(render::Backend::automatic, width, height, &reason);
   });
   if (tried && picture->renderer) return picture.release();
-  refuse(tried ? reason : kNoMemory, why, capacity);
+  refuse(tried ? reason.c_str() : kNoMemory, why, capacity);
   return nullptr;
 }
 PICTURE_API void deform_picture_destroy(void *picture) { delete static_cast<Picture *>(picture); }
@@ -180,7 +180,7 @@ PICTURE_API void deform_picture_text(void *picture, const char *text) {
  * @return 1; 0: why says what was refused */
 PICTURE_API int deform_picture_draw(void *handle, uint8_t *rgb, char *why, size_t capacity) {
   Picture &picture = *static_cast<Picture *>(handle);
-  std::string reason = kNoMemory;
+  std::string reason;
   bool drawn = false;
   attempt([&] {
     if (!picture.added) return;
@@ -194,5 +194,5 @@ PICTURE_API int deform_picture_draw(void *handle, uint8_t *rgb, char *why, size_
     std::copy(image.rgb.begin(), image.rgb.end(), rgb);
     drawn = true;
   });
-  return drawn ? 1 : refuse(reason, why, capacity);
+  return drawn ? 1 : refuse(reason.empty() ? kNoMemory : reason.c_str(), why, capacity);
 }
