@@ -3,11 +3,15 @@
 #include <algorithm>
 #include <cstdio>
 #include <cstring>
+#include <exception>
 #include <memory>
+#include <new>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "deform/plugin.h"
 #include "render/render.h"
 
 #define PICTURE_API extern "C" __attribute__((visibility("default")))
@@ -30,32 +34,33 @@ struct Picture {
   std::vector<std::pair<std::string, double>> texts;  // and the height of their base line
   std::optional<Legend> legend;
   bool tilts = false;
-  bool added = true;  // all that was to be; false where memory was short
+  std::exception_ptr trouble;  // of what was to be added
 };
-
-int refuse(const char *sentence, char *why, size_t capacity) {
-  std::snprintf(why, capacity, "%s", sentence);
-  return 0;
-}
 
 // No exception goes on into C.
 template <class F>
-bool attempt(F f) {
+int attempt(char *why, size_t capacity, F f) {
   try {
     f();
-    return true;
-  } catch (const std::exception &) {
-    return false;
+    return DFM_OK;
+  } catch (const std::bad_alloc &) {
+    std::snprintf(why, capacity, "no memory for a picture of this size");
+    return DFM_E_NOMEM;
+  } catch (const std::exception &e) {
+    std::snprintf(why, capacity, "%s", e.what());
+    return DFM_E_UNSUPPORTED;
   }
 }
 
 template <class F>
 void add(void *picture, F f) {
   Picture &p = *static_cast<Picture *>(picture);
-  p.added = attempt([&] { f(p); }) && p.added;
+  try {
+    f(p);
+  } catch (...) {
+    p.trouble = std::current_exception();
+  }
 }
-
-constexpr const char *kNoMemory = "no memory for a picture of this size";
 
 template <size_t N>
 void copy(double (&to)[N], const double *from) {
@@ -64,17 +69,16 @@ void copy(double (&to)[N], const double *from) {
 
 }  // namespace
 
-/** @param why out, [capacity] one sentence where no picture can be made here. @return NULL then. */
-PICTURE_API void *deform_picture_create(uint32_t width, uint32_t height, char *why, size_t capacity) {
-  std::unique_ptr<Picture> picture;
-  std::string reason;
-  const bool tried = attempt([&] {
-    picture = std::make_unique<Picture>();
+/** @param why out, [capacity] one sentence where no picture can be made here. @return DFM_OK or DFM_E_*. */
+PICTURE_API int deform_picture_create(uint32_t width, uint32_t height, void **out, char *why,
+                                      size_t capacity) {
+  return attempt(why, capacity, [&] {
+    auto picture = std::make_unique<Picture>();
+    std::string reason;
     picture->renderer = render::Renderer::create(render::Backend::automatic, width, height, &reason);
+    if (!picture->renderer) throw std::runtime_error(reason);
+    *out = picture.release();
   });
-  if (tried && picture->renderer) return picture.release();
-  refuse(tried ? reason.c_str() : kNoMemory, why, capacity);
-  return nullptr;
 }
 PICTURE_API void deform_picture_destroy(void *picture) { delete static_cast<Picture *>(picture); }
 
@@ -177,22 +181,19 @@ PICTURE_API void deform_picture_text(void *picture, const char *text) {
 }
 
 /** Draws what was added. @param rgb out, [height,width,3], rows from the top
- * @return 1; 0: why says what was refused */
+ * @return DFM_OK, or DFM_E_*: why says what was refused */
 PICTURE_API int deform_picture_draw(void *handle, uint8_t *rgb, char *why, size_t capacity) {
   Picture &picture = *static_cast<Picture *>(handle);
-  std::string reason;
-  bool drawn = false;
-  attempt([&] {
-    if (!picture.added) return;
+  return attempt(why, capacity, [&] {
+    if (picture.trouble) std::rethrow_exception(picture.trouble);
     for (render::Plane &plane : picture.scene.planes) plane.slab = picture.tilts;
     render::Image image;
-    if (!picture.renderer->draw(picture.scene, image, &reason)) return;
+    std::string reason;
+    if (!picture.renderer->draw(picture.scene, image, &reason)) throw std::runtime_error(reason);
     for (const auto &[text, y] : picture.texts)
       render::draw_text(image, 16, y, 14, text, {0.15f, 0.17f, 0.2f});
     if (const auto &l = picture.legend)
       render::legend(image, picture.scene.map, l->low, l->high, l->title, l->unit);
     std::copy(image.rgb.begin(), image.rgb.end(), rgb);
-    drawn = true;
   });
-  return drawn ? 1 : refuse(reason.empty() ? kNoMemory : reason.c_str(), why, capacity);
 }

@@ -259,9 +259,8 @@ VkResult VulkanStepper::record(VkCommandBuffer commands, const Batch &batch) con
 // What was recorded is used again where it is the same, as it is from step to step.
 const char *VulkanStepper::run(uint32_t n, double h, const Dampers &dampers, bool moved, bool loaded) {
   if (!work_.npass)
-    return "after a change its arrays have no room on the device; make room there and change it again, or "
-           "take "
-           "the model without _gpu";
+    return "its last change has not reached the device, as was said then; change it again, "
+           "or take the model without _gpu";
   *highest_ = 0;
   for (uint32_t taken = 0; taken < n;) {
     const uint32_t some = std::min(n - taken, kMaxSteps);

@@ -51,10 +51,10 @@ def main():
                            cwd=folder, check=True, stdout=subprocess.DEVNULL)
             data = made.read_bytes()
         found = without_names(struct.unpack(f"<{len(data) // 4}I", data))
+        text = ",\n".join(textwrap.wrap(" ".join(map(str, found)), 109)).replace(" ", ",") + "\n"
         if "--write" in sys.argv:
-            rows = textwrap.wrap(" ".join(map(str, found)), 109)
-            kept.write_text(",\n".join(rows).replace(" ", ",") + "\n")
-        if not found or found != [int(word) for word in kept.read_text().split(",")]:
+            kept.write_text(text)
+        if kept.read_text() != text:
             print(f"{kept.name} differs from what {glslang} makes; run {sys.argv[0]} with --write")
             wrong += 1
         elif contracted(found):

@@ -329,7 +329,6 @@ class InPython(unittest.TestCase):
                 thread.join()
         self.assertEqual(raised, [])
 
-
     def test_a_host_with_a_timer(self):
         """Whose calls it interrupts; in Python none goes on by itself."""
         class Slow(Tanh):

@@ -19,7 +19,7 @@ import unittest.mock
 import numpy as np
 
 import deform
-from deform._library import refuse_foreign
+from deform._library import clear_own, refuse_foreign
 from deform.study import __main__ as command_line, plots
 from deform.study.design import points
 from deform.study.engine import Engine, Failed, Results
@@ -479,6 +479,15 @@ class Outputs(InAFolder):
         self.assertEqual(foreign.read_bytes(), b"PAR1 mine PAR1")
         foreign.write_bytes(b"PAR1" + bytes(3 << 20) + b"deform sweep" + bytes(100))
         refuse_foreign(foreign, "deform sweep")
+        for data in b"", bytes(1 << 20) + b"mine" + bytes(1 << 20):  # has no mark: not its own
+            foreign.write_bytes(data)
+            clear_own(self.out, {"sweep.parquet": "deform sweep"}, [])
+            self.assertEqual(foreign.read_bytes(), data)
+        with self.assertRaises(deform.FileError):
+            refuse_foreign(foreign, "deform sweep")
+        foreign.unlink()
+        foreign.mkdir()  # a partitioned data set
+        clear_own(self.out, {"sweep.parquet": "deform sweep"}, [])
 
     def test_windows_is_refused_before_anything_is_made(self):
         for study in deform.sweep, deform.fit:

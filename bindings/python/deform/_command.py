@@ -66,7 +66,7 @@ class Table(list):
         return "\n".join([*self.notes] + ["  ".join(c.ljust(w) for c, w in zip(line, widths)).rstrip()
                                           for line in cells])
 
-    def html(self, titles: Sequence[str]) -> str:
+    def table_html(self, titles: Sequence[str]) -> str:
         """The rows, below titles of the columns; its classes are those of a study's page."""
         head = "".join(f"<th>{escape(title)}</th>" for title in titles)
         rows = ""
@@ -76,10 +76,10 @@ class Table(list):
                 text = escape(_shown(row.get(c), self.digits))
                 rows += f'<td{" class=said" if c == "said" else ""}>{text}</td>'
             rows += "</tr>"
-        return f"<table><tr>{head}</tr>{rows}</table>"
+        return f"<table><thead><tr>{head}</tr></thead>{rows}</table>"
 
     def _repr_html_(self) -> str:
-        return "".join(f"<p>{escape(note)}</p>" for note in self.notes) + self.html(self.columns)
+        return "".join(f"<p>{escape(note)}</p>" for note in self.notes) + self.table_html(self.columns)
 
 
 class Cost(Table):

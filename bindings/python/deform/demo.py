@@ -75,7 +75,7 @@ def table(runs: dict[str, dict[str, Any]]) -> None:
 def demo(command: Any, scene: Any, out: pathlib.Path) -> None:
     out.mkdir(parents=True, exist_ok=True)
     picture, summary = out / "two_cylinders.png", out / "summary.json"
-    own = summary.exists() and b'"picture": ' in summary.read_bytes()
+    own = summary.exists() and b'two_cylinders.png"' in summary.read_bytes()
     for file in (summary, picture):
         if file.exists() and not own:
             sys.exit(f"demo: {file}: another program wrote this file, and it stays as it is; give another "

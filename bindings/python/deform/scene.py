@@ -214,11 +214,11 @@ class Run:
         return np.stack([frame.positions[body] for frame in self.frames])
 
     def top(self) -> float:
-        """The largest value by which anything is colored, of all frames."""
+        """The largest value by which anything is colored, of all frames recorded."""
         return self._top
 
     def value_range(self) -> tuple[float, float]:
-        """The values at the ends of the colors: color_range, or 0 and the largest of all frames."""
+        """The values at the ends of the colors: color_range, or 0 and top()."""
         return ends(self.color_range, self._top)
 
     def picture(self, frame: int = -1, *, size: tuple[int, int] = (960, 720), eye: Any = None,

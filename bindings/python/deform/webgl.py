@@ -43,15 +43,12 @@ def _surface(number: int, shape: int, points: np.ndarray, triangles: np.ndarray)
 
 def _thing(number: int, solid: Solid) -> list[bytes]:
     """An obstacle or rigid body, which has the same shape in all frames."""
-    points, triangles = np.empty((0, 3)), np.empty((0, 3))
-    if solid.points is not None and solid.triangles is not None:
-        back = solid.pose[3:] * (-1, -1, -1, 1)
-        points, triangles = turned(back, solid.points - solid.pose[:3]), solid.triangles
+    points = turned(solid.pose[3:] * (-1, -1, -1, 1), solid.points - solid.pose[:3])
     radius, half = (solid.size[0], solid.size[1]) if solid.kind in (1, 3) else (0, 0)
     box = solid.size if solid.kind == 2 else (0, 0, 0)
-    numbers = number, 1, len(points), len(triangles), solid.kind
+    numbers = number, 1, len(points), len(solid.triangles), solid.kind
     return [_chunk(b"OBST", struct.pack("<5I5f", *numbers, radius, half, *box), _named("")),
-            *_surface(number, 1, points, triangles)]
+            *_surface(number, 1, points, solid.triangles)]
 
 
 def _moved(number: int, shape: int, moved: np.ndarray) -> bytes:

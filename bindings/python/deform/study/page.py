@@ -19,7 +19,7 @@ def page(title: str, sentences: Sequence[str], figures: Mapping[str, bytes], row
     said = "".join(f"<p>{escape(text)}</p>" for text in sentences)
     drawn = "".join(f'<p><img alt="{escape(name)}" src="data:image/png;base64,'
                     f'{base64.b64encode(data).decode()}"></p>' for name, data in figures.items())
-    table = rows.html([titled(name, units) for name in rows.columns])
+    table = rows.table_html([titled(name, units) for name in rows.columns])
     return (f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{escape(title)}</title>'
             f'<style>{STYLE}</style><h1>{escape(title)}</h1>{said}{drawn}<div class=rows>{table}'
             '</div></html>\n').encode(errors="replace")
