@@ -2,6 +2,7 @@
  * for the law's description when it is loaded and for every evaluation. So the command (its validator, its
  * rig) meets a Python law as it meets any other plugin file. The other side is deform/law.py; both run on one
  * machine, so numbers travel as they lie in memory. */
+#include <errno.h>
 #include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -33,11 +34,11 @@ static void take(void *to, size_t bytes) {
   char *at = to;
   while (bytes && !broken) {
     const ssize_t n = recv(channel, at, bytes, 0);
-    if (n <= 0) {
-      broken = 1;
-    } else {
+    if (n > 0) {
       at += n;
       bytes -= (size_t)n;
+    } else if (n == 0 || errno != EINTR) {
+      broken = 1;
     }
   }
   if (broken) memset(at, 0, bytes);
@@ -47,11 +48,11 @@ static void give(const void *from, size_t bytes) {
   const char *at = from;
   while (bytes && !broken) {
     const ssize_t n = send(channel, at, bytes, MSG_NOSIGNAL);
-    if (n <= 0) {
-      broken = 1;
-    } else {
+    if (n > 0) {
       at += n;
       bytes -= (size_t)n;
+    } else if (n == 0 || errno != EINTR) {
+      broken = 1;
     }
   }
 }

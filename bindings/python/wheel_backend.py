@@ -79,7 +79,8 @@ def _oldest(version):
 
 def asked_of_system(path):
     """(libraries that not every system has, versions of symbols that it asks the others for)"""
-    said = subprocess.run(["objdump", "-p", str(path)], capture_output=True, text=True, check=True).stdout
+    said = subprocess.run(["objdump", "-p", str(path)], capture_output=True, text=True, check=True,
+                          env={**os.environ, "LC_ALL": "C"}).stdout  # it translates what is read here
     of = re.findall(r"^  required from (\S+):\n((?:    0x.*\n)+)", said, re.M)
     return (set(re.findall(r"^ *NEEDED +(\S+)$", said, re.M)) - EVERYWHERE,
             {line.split()[-1] for library, lines in of if library in EVERYWHERE

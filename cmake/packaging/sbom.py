@@ -80,6 +80,7 @@ def resolved(path):
 
 
 def main():
+    os.environ["LC_ALL"] = "C"  # dpkg translates words that are read here
     build, out, version = pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(sys.argv[2]), sys.argv[3]
     if not all(map(shutil.which, ("ninja", "objdump", "dpkg-query"))) or not (build / "build.ninja").exists():
         return print("sbom: takes a build by ninja, objdump and dpkg; nothing is written")

@@ -74,6 +74,8 @@ void Body<Of>::apply_params(const double *values) {
     }
   } catch (const std::string &why) {
     model::refuse(host, Of::kId, "%s", why.c_str());
+  } catch (const char *why) {
+    model::refuse(host, Of::kId, "%s", why);
   }
   facts_[0] = {"longest_step",
                parts_.drawn ? "sub-step that is stable near rest; where cells are drawn far, shorter"

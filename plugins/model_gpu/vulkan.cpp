@@ -29,12 +29,6 @@ constexpr Code kCode[kKernels] = {{sizeof kOfSprings, kOfSprings},
                                   {sizeof kOfMotion, kOfMotion},
                                   {sizeof kOfVolumes, kOfVolumes}};
 
-void must(VkResult result, const char *what) {
-  if (result == VK_SUCCESS) return;
-  throw std::string("the driver failed in ") + what + " (VkResult " + std::to_string(int(result)) +
-      "); choose another device, or a smaller body if its memory is full";
-}
-
 // The smaller, the better.
 int rank_of(VkPhysicalDeviceType type) {
   switch (type) {
@@ -48,6 +42,12 @@ int rank_of(VkPhysicalDeviceType type) {
 constexpr int kSoftware = 4;
 
 }  // namespace
+
+void must(VkResult result, const char *what) {
+  if (result == VK_SUCCESS) return;
+  throw std::string("the driver failed in ") + what + " (VkResult " + std::to_string(int(result)) +
+      "); choose another device, or a smaller body if its memory is full, or take the model without _gpu";
+}
 
 Vulkan::Vulkan(Wanted wanted) {
   try {

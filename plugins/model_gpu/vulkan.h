@@ -30,6 +30,8 @@
 
 namespace gpu {
 
+void must(VkResult result, const char *what);  // throws std::string: a sentence without its full stop
+
 // Which device: the best one, one that is no software driver, a software driver.
 enum class Wanted : uint32_t { automatic, hardware, software };
 

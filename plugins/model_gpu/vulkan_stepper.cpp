@@ -23,12 +23,6 @@ VkAccessFlags reads_of(VkPipelineStageFlags stages) {
          (stages & kProcessor ? VK_ACCESS_HOST_READ_BIT : 0);
 }
 
-void must(VkResult result, const char *what) {
-  if (result == VK_SUCCESS) return;
-  throw std::string(what) + " failed on the device (VkResult " + std::to_string(int(result)) +
-      "); take a smaller body, or take the model without _gpu";
-}
-
 }  // namespace
 
 VulkanStepper::VulkanStepper(std::shared_ptr<Vulkan> vulkan, uint32_t npoint)
@@ -199,7 +193,7 @@ void VulkanStepper::take(const Work &work) {
     vulkan_->need(work.pass[p].kernel, work.pass[p].options);
   }
   bool anew = work.npass != work_.npass || !std::equal(work.pass, work.pass + work.npass, work_.pass);
-  work_.npass = 0;
+  work_.npass = 0;  // until all of it is on the device
   const auto remake = [&](Array &array, size_t bytes, bool mapped) {
     if (array.bytes == bytes) return;
     anew = true;
@@ -214,9 +208,9 @@ void VulkanStepper::take(const Work &work) {
     std::fill(recorded_, recorded_ + kBatches, Batch{});
     describe();
   }
-  work_ = work;
   for (uint32_t n = kOwn; n < kBindings; ++n)
     if (work.array[n].data) upload(own_[n], work.array[n].data, work.array[n].bytes);
+  work_ = work;
 }
 
 VkResult VulkanStepper::record(VkCommandBuffer commands, const Batch &batch) const {
@@ -264,6 +258,9 @@ VkResult VulkanStepper::record(VkCommandBuffer commands, const Batch &batch) con
 
 // What was recorded is used again where it is the same, as it is from step to step.
 const char *VulkanStepper::run(uint32_t n, double h, const Dampers &dampers, bool moved, bool loaded) {
+  if (!work_.npass)
+    return "its last change has not reached the device, as was said then; change it again, "
+           "or take the model without _gpu";
   *highest_ = 0;
   for (uint32_t taken = 0; taken < n;) {
     const uint32_t some = std::min(n - taken, kMaxSteps);

@@ -75,8 +75,14 @@ TEST(GpuDriver, ThatTakesNoCommands_IsReported) {
 TEST(GpuDriver, ThatCopiesNothing_RefusesTheBody) {
   Moving one;
   if (!one.stepper) GTEST_SKIP() << one.missing;
+  const auto works = one.vulkan->EndCommandBuffer;
   one.vulkan->EndCommandBuffer = [](VkCommandBuffer) { return VK_ERROR_OUT_OF_DEVICE_MEMORY; };
   EXPECT_THROW(one.stepper->take(one.none.work()), std::string);
+  one.vulkan->EndCommandBuffer = works;
+  EXPECT_NE(one.run(), nullptr);  // not with half of its arrays
+  one.stepper->take(one.none.work());
+  EXPECT_EQ(one.run(), nullptr);
+  EXPECT_EQ(one.stepper->place[0].x, 1);
 }
 
 }  // namespace

@@ -1,32 +1,40 @@
 #!/usr/bin/env python3
-"""The SPIR-V in the source tree is what glslangValidator makes of the shaders, and no sum in it may be
-contracted with a product.
+"""The SPIR-V in the source tree is what glslangValidator makes of the shaders, without names for debuggers,
+and no sum in it may be contracted with a product.
 
 spirv.py GLSLANG FOLDER [--write]    --write replaces the words in the tree
 """
 import pathlib
-import re
+import struct
 import subprocess
 import sys
 import tempfile
+import textwrap
 
 DECORATE, F_ADD, F_SUB, NO_CONTRACTION = 71, 129, 131, 42
+NAMES = range(3, 7)  # OpSource, OpSourceExtension, OpName, OpMemberName
 
 
-def words(text):
-    return re.findall(r"0x[0-9a-f]{8}", re.sub(r"//.*", "", text))
-
-
-def contracted(found):
-    """Sums and differences that are not precise."""
-    code, at, kept, sums = [int(word, 16) for word in found], 5, set(), set()
+def instructions(code):
+    at = 5
     while at < len(code):
-        length, op = code[at] >> 16, code[at] & 0xffff
-        if op == DECORATE and code[at + 2] == NO_CONTRACTION:
-            kept.add(code[at + 1])
-        elif op in (F_ADD, F_SUB):
-            sums.add(code[at + 2])
-        at += length
+        yield code[at:at + (code[at] >> 16)]
+        at += code[at] >> 16
+
+
+def without_names(code):
+    kept = [one for one in instructions(code) if one[0] & 0xffff not in NAMES]
+    return [*code[:5], *(word for one in kept for word in one)]
+
+
+def contracted(code):
+    """Sums and differences that are not precise."""
+    kept, sums = set(), set()
+    for head, *rest in instructions(code):
+        if head & 0xffff == DECORATE and rest[1] == NO_CONTRACTION:
+            kept.add(rest[0])
+        elif head & 0xffff in (F_ADD, F_SUB):
+            sums.add(rest[1])
     return len(sums - kept)
 
 
@@ -38,14 +46,15 @@ def main():
     for shader in shaders:
         kept = shader.with_suffix(".inc")
         with tempfile.TemporaryDirectory() as scratch:
-            made = pathlib.Path(scratch) / "words"
-            subprocess.run([glslang, "-V", "--target-env", "vulkan1.1", "-x", "-o", made, shader.name],
+            made = pathlib.Path(scratch) / "code"
+            subprocess.run([glslang, "-V", "--target-env", "vulkan1.1", "-o", made, shader.name],
                            cwd=folder, check=True, stdout=subprocess.DEVNULL)
-            found = words(made.read_text())
+            data = made.read_bytes()
+        found = without_names(struct.unpack(f"<{len(data) // 4}I", data))
+        text = ",\n".join(textwrap.wrap(" ".join(map(str, found)), 109)).replace(" ", ",") + "\n"
         if "--write" in sys.argv:
-            rows = [", ".join(found[i:i + 8]) + ",\n" for i in range(0, len(found), 8)]
-            kept.write_text("".join(rows))
-        if not found or found != words(kept.read_text()):
+            kept.write_text(text)
+        if kept.read_text() != text:
             print(f"{kept.name} differs from what {glslang} makes; run {sys.argv[0]} with --write")
             wrong += 1
         elif contracted(found):

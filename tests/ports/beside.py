@@ -8,6 +8,7 @@ import pathlib
 import shlex
 import subprocess
 import sys
+import tempfile
 
 SCENES = pathlib.Path(__file__).resolve().parents[2] / "examples/scenes"
 
@@ -15,7 +16,9 @@ SCENES = pathlib.Path(__file__).resolve().parents[2] / "examples/scenes"
 def run(command, scene, time):
     """The summary of deform run."""
     options = ["--json", "--quiet", "--threads", "1", "--time", str(time)]
-    done = subprocess.run([*command, "run", scene, *options], capture_output=True, text=True)
+    with tempfile.TemporaryDirectory() as out:  # one folder takes one run at a time
+        words = [*command, "run", scene, "--out", out, *options]
+        done = subprocess.run(words, capture_output=True, text=True)
     if done.returncode:
         raise SystemExit(f"{' '.join(command)}: {done.stderr}")
     return json.loads(done.stdout)

@@ -52,6 +52,17 @@ class Command(unittest.TestCase):
                                "plugin", "list"], capture_output=True, text=True, check=True)
         self.assertIn("org.deform.lugre", done.stdout)
 
+    def test_demo_leaves_what_others_wrote(self):
+        for name in ("summary.json", "two_cylinders.png"):
+            with tempfile.TemporaryDirectory() as folder:
+                file = pathlib.Path(folder) / name
+                file.write_text('{"picture": "mine.png"}')
+                done = subprocess.run([sys.executable, "-B", "-m", "deform", "demo", folder], text=True,
+                                      capture_output=True, check=False)
+                self.assertIn(f"{name}: another program wrote this file", done.stderr)
+                self.assertEqual([*pathlib.Path(folder).iterdir()], [file])
+                self.assertEqual(file.read_text(), '{"picture": "mine.png"}')
+
 
 if __name__ == "__main__":
     unittest.main()

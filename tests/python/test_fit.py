@@ -11,6 +11,7 @@ import subprocess
 import sys
 import tempfile
 import unittest
+import unittest.mock
 
 import numpy as np
 import scipy.stats
@@ -261,6 +262,10 @@ class Said(InAFolder):
         foreign.unlink()
         for _ in range(2):  # its own it replaces
             self.assertIn(self.folder / "named" / "fit.json", found.write())
+        none = deform.UnsupportedError("no matplotlib", "DFM_E_UNSUPPORTED")
+        with unittest.mock.patch.object(type(found), "figure", side_effect=none):
+            found.write()
+        self.assertFalse((self.folder / "named" / "fit.png").exists())  # of the call before
 
     def test_wrong_studies(self):
         def refused(sentence, **changes):

@@ -1,11 +1,15 @@
 """Friction laws from Python: those that are loaded, and laws as Python classes, by themselves, in a world,
 on the rig and before the validator."""
 import gc
+import os
 import signal
 import socket
 import struct
+import subprocess
+import sys
 import tempfile
 import threading
+import time
 import unittest
 from unittest import mock
 
@@ -271,6 +275,7 @@ class InPython(unittest.TestCase):
                       {"id": "com.example.d", "parameters": [("mu", 0.3)]},
                       {"id": "com.example.e", "parameters": [deform.Parameter("fn", "", "1", 0, 1, 0)]},
                       {"id": "com.example.f", "parameters": [deform.Parameter("a b", "", "1", 0, 1, 0)]},
+                      {"id": "a.g", "parameters": [deform.Parameter("a", "", "1", 0, 1, 0, 1, ("b",))]},
                       {"id": "com.example.c", "parameters": [deform.Parameter("mu", "", "1", 1, 0, 2)]}):
             with self.subTest(wrong), self.assertRaises(deform.Error):
                 deform.Law(type("Wrong", (Bristle,), wrong))
@@ -323,6 +328,22 @@ class InPython(unittest.TestCase):
             for thread in set(threading.enumerate()) - before:
                 thread.join()
         self.assertEqual(raised, [])
+
+    def test_a_host_with_a_timer(self):
+        """Whose calls it interrupts; in Python none goes on by itself."""
+        class Slow(Tanh):
+            def evaluate(self, x, out):
+                time.sleep(0.05)
+                super().evaluate(x, out)
+
+        host = ("import pathlib, signal, sys, deform; law = deform.Law(pathlib.Path(sys.argv[1]))\n"
+                "signal.signal(signal.SIGALRM, lambda *_: None)\n"
+                "signal.setitimer(signal.ITIMER_REAL, 1e-3, 1e-3)\n"
+                "print([law(fn=[2], vt=[[9], [0]], dt=1e-3)['limit'].tolist() for _ in range(2)])")
+        with Slow().served() as (file, environment):
+            said = subprocess.run([sys.executable, "-B", "-c", host, file], capture_output=True, text=True,
+                                  env={**os.environ, **environment})
+        self.assertEqual(said.stdout, "[[1.0], [1.0]]\n", said.stderr)
 
 
 class Validator(unittest.TestCase):

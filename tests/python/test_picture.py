@@ -130,6 +130,13 @@ class Pictures(unittest.TestCase):
             with self.assertRaisesRegex(deform.ArgumentError, "second value must be larger"):
                 world.picture(color="speed", color_range=(1, 1))
 
+    def test_stress_is_that_of_the_nearest_point_far_from_the_origin(self):
+        random = np.random.default_rng(1)
+        points, surfels = 0.1 * random.random((2000, 3)), 0.1 * random.random((500, 3))
+        near, far = (deform.picture._nearest(mock.Mock(points=points + away, positions=surfels + away))
+                     for away in (0, 1e5))
+        np.testing.assert_array_equal(near, far)
+
     def test_without_its_module_says_what_builds_it(self):
         with mock.patch.multiple(deform.picture, _module=None, _MODULE="libdeform_gone.so"):
             with self.assertRaisesRegex(deform.UnsupportedError, "gone.so, .* is not there: `make wheel`"):
@@ -189,8 +196,42 @@ class Pictures(unittest.TestCase):
             np.testing.assert_array_equal(deform.picture.upright_of(world).at(0), [0, -1, 0])
             self.assertIsInstance(world.picture(size=(8, 8)), deform.Picture)
 
+    def test_renderers_of_sizes_that_are_not_drawn_any_more_go(self):
+        with deform.World() as world:
+            native = deform.picture._native()
+            with mock.patch.object(native, "deform_picture_destroy",
+                                   wraps=native.deform_picture_destroy) as destroy:
+                for width in range(20, 25):
+                    world.picture(size=(width, 16))
+            self.assertGreater(destroy.call_count, 0)
+            self.assertEqual(world.picture(size=(20, 16)).rgb.shape, (16, 20, 3))
+
+    def test_short_memory_is_told(self):
+        """Of a process that may not have more."""
+        said = subprocess.run([sys.executable, "-B", "-c", """
+import resource
+import deform.picture
+def draw(text):
+    deform.picture.draw([], [], size=(8, 8), texts=[text], value_range=(0, 1), t=0,
+                        upright=deform.picture.Upright(0, [0, 0, -9.8]))
+draw("")
+line = "x" * 64_000_000
+size = 4096 * int(open("/proc/self/statm").read().split()[0])
+resource.setrlimit(resource.RLIMIT_AS, (size + 100_000_000,) * 2)  # of its two copies
+try:
+    draw(line)
+except deform.OutOfMemory as error:
+    print(error.status, error)
+"""], capture_output=True, text=True)
+        self.assertEqual(said.stdout, "DFM_E_NOMEM no picture: no memory for a picture of this size\n",
+                         said.stderr)
+
     def test_frames_of_a_run(self):
         run = dropped()
+        run.camera = (0, -1, 0.4), (0, 0, 0.1)
+        with self.assertRaisesRegex(deform.ArgumentError, "a camera has both eye and look_at"):
+            run.picture(look_at=(0, 0, 1))
+        run.camera = None
         first, last = run.picture(0, size=(160, 120)), run.picture(-1, size=(160, 120))
         self.assertFalse(np.array_equal(first.rgb, last.rgb))
         with tempfile.TemporaryDirectory(suffix=" with space") as folder:
@@ -222,7 +263,11 @@ class View(unittest.TestCase):
                 np.testing.assert_allclose(thing.pose, solid.pose, atol=1e-6)
             self.assertEqual(set(scene.present), {1, 2, 3, 4})
         self.assertEqual(scene.things[3].half_size, np.float32([0.05, 0.1, 0.02]).tolist())
-        self.assertEqual(webgl._values(run, np.array([0, run.value_range()[1]])).tolist(), [1, 255])
+        span = run.value_range()
+        self.assertEqual(webgl._values("speed", span, np.array([0, span[1]])).tolist(), [1, 255])
+        with mock.patch.object(deform.Run, "value_range", return_value=span) as asked:
+            webgl.document(run)
+        self.assertLess(asked.call_count, len(run.frames))
 
     def test_cut_body_is_told_again(self):
         with deform.World() as world:
@@ -276,6 +321,7 @@ class View(unittest.TestCase):
             np.testing.assert_allclose(film.times, np.arange(11) / 100, atol=1e-9)
             np.testing.assert_allclose(film.positions("ball")[-1], body.positions, atol=1e-7)
             self.assertGreater(film.top(), 0)
+            self.assertEqual(film.top(), max(frame.values["ball"].max() for frame in film.frames))
             self.assertEqual((film.steps, film.frames[-1].contacts), (100, int(world.stats.contacts)))
             body.remove()
             with self.assertRaisesRegex(deform.ArgumentError, "body 'ball' is gone"):

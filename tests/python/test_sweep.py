@@ -19,8 +19,8 @@ import unittest.mock
 import numpy as np
 
 import deform
-from deform._library import refuse_foreign
-from deform.study import __main__ as command_line
+from deform._library import clear_own, refuse_foreign
+from deform.study import __main__ as command_line, plots
 from deform.study.design import points
 from deform.study.engine import Engine, Failed, Results
 from deform.study.executors import Dask
@@ -441,6 +441,18 @@ class Kills(InAFolder):
 
 
 class Outputs(InAFolder):
+    def test_map_of_points_that_repeat_shows_all_runs(self):
+        try:
+            from matplotlib.collections import PathCollection
+        except ImportError:
+            self.skipTest("no matplotlib")
+        rows = [{"mu": mu, "v": v, "slid": i, "state": "done"}
+                for i, (mu, v) in enumerate([(0.1, 1), (0.2, 2), (0.1, 1), (0.2, 2)])]
+        parameters = read_study(self.study()).parameters
+        shown = plots.maps(plots.Columns(rows, parameters, ["slid"], {})).axes[0].collections[0]
+        self.assertIsInstance(shown, PathCollection)
+        self.assertEqual(shown.get_array().tolist(), [0, 1, 2, 3])
+
     def test_files_of_others_stay_as_they_are(self):
         study = self.study(design={"method": "random", "runs": 1})
         for name, options in (("sweep.csv", ()), ("sweep.html", ()), ("curves.png", ()), ("runs.jsonl", ()),
@@ -467,6 +479,15 @@ class Outputs(InAFolder):
         self.assertEqual(foreign.read_bytes(), b"PAR1 mine PAR1")
         foreign.write_bytes(b"PAR1" + bytes(3 << 20) + b"deform sweep" + bytes(100))
         refuse_foreign(foreign, "deform sweep")
+        for data in b"", bytes(1 << 20) + b"mine" + bytes(1 << 20):  # has no mark: not its own
+            foreign.write_bytes(data)
+            clear_own(self.out, {"sweep.parquet": "deform sweep"}, [])
+            self.assertEqual(foreign.read_bytes(), data)
+        with self.assertRaises(deform.FileError):
+            refuse_foreign(foreign, "deform sweep")
+        foreign.unlink()
+        foreign.mkdir()  # a partitioned data set
+        clear_own(self.out, {"sweep.parquet": "deform sweep"}, [])
 
     def test_windows_is_refused_before_anything_is_made(self):
         for study in deform.sweep, deform.fit:
@@ -481,6 +502,9 @@ class Outputs(InAFolder):
         self.assertEqual(of_one_kind([0.5, "auto", None]), ["0.5", "auto", None])
 
     def test_command_writes_tables_and_page(self):
+        self.out.mkdir()
+        (self.out / "sweep.parquet").write_bytes(b"of an earlier deform sweep")
+        (self.out / "runs.jsonl").write_bytes(bytes(300))  # as a loss of power may leave it
         said = self.command("sweep", self.study(), "--out", self.out, "--workers", "2")
         self.assertIn("16 runs: 16 done, 0 failed", said.stdout)
         with open(self.out / "sweep.csv", newline="") as file:
@@ -492,6 +516,9 @@ class Outputs(InAFolder):
         self.assertNotIn("http", page)
         for name in "curves", "map", "parallel":
             self.assertEqual((self.out / f"{name}.png").read_bytes()[1:4], b"PNG")
+        self.command("sweep", self.study(design={"method": "random", "runs": 1}), "--out", self.out)
+        self.assertEqual(sorted(path.name for path in self.out.iterdir()),
+                         ["runs.jsonl", "sweep.csv", "sweep.html"])
 
     def test_parquet_holds_units(self):
         study = self.study(design={"method": "sobol", "runs": 4})

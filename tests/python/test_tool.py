@@ -53,7 +53,7 @@ class Shapes(Scenery):
     def test_mesh(self):
         ball = deform.TriMesh.make("ball", [0.01], 100)
         self.world.add_tool("mesh", mesh=ball, position=(0, 0, 1))
-        self.assertAlmostEqual(self.world.ray((0, 0, 2), (0, 0, -1))["distance"], 0.99, delta=1e-3)
+        self.assertAlmostEqual(self.world.query_ray((0, 0, 2), (0, 0, -1)).distance, 0.99, delta=1e-3)
         with self.assertRaisesRegex(deform.ArgumentError, "the mesh of a tool is a .* the path"):
             self.world.add_tool("mesh", mesh=7)
 
@@ -275,8 +275,8 @@ class Tools(Scenery):
 
     def test_a_sphere_without_a_radius_has_five_millimeters(self):
         self.world.add_tool("sphere", position=(0, 0, 1))
-        hit = self.world.ray((0, 0, 2), (0, 0, -1))
-        self.assertAlmostEqual(hit["distance"], 0.995, places=6)
+        hit = self.world.query_ray((0, 0, 2), (0, 0, -1))
+        self.assertAlmostEqual(hit.distance, 0.995, places=6)
 
     def test_what_is_wrong_is_said(self):
         with self.assertRaisesRegex(deform.ArgumentError, "sphere"):

@@ -126,6 +126,15 @@ class Wheel(unittest.TestCase):
             both = [("lib/libb.so", made), (f"lib/{other.name}", other)]
             self.assertIn("manylinux", wheel_backend._tag(both))
             self.assertRegex(wheel_backend._tag(both[:1]), r"^py3-none-linux_\w+$")
+            english = wheel_backend.asked_of_system(library)  # also for those who speak another language
+            self.assertTrue(english[1])
+            french = pathlib.Path(name) / "objdump"
+            french.write_text(f"#!/bin/sh\n{shutil.which('objdump')} \"$@\" | if [ \"$LC_ALL\" = C ]\n"
+                              f"then cat; else sed 's/required from/requis par/'; fi\n")
+            french.chmod(0o755)
+            with unittest.mock.patch.dict(os.environ, LC_ALL="fr_FR.UTF-8",
+                                          PATH=f"{name}:{os.environ['PATH']}"):
+                self.assertEqual(wheel_backend.asked_of_system(library), english)
 
     def test_no_symbol_is_newer_than_the_oldest_system(self):
         """manylinux_2_34: RHEL 9 and what is younger. A newer glibc than Debian 12's gives newer symbols to

@@ -3,11 +3,13 @@ from __future__ import annotations
 
 import json
 import logging
+import math
 import os
 import signal
 import subprocess
 import sys
 import tempfile
+from html import escape
 from typing import Any, Mapping, Sequence
 
 from ._library import ArgumentError, Diverged, Error, command_path
@@ -40,7 +42,7 @@ def command(*arguments: Any, environment: Mapping[str, str] | None = None) -> st
 
 def _shown(value: Any, digits: int) -> str:
     if isinstance(value, float):
-        return f"{value:.{digits}g}"
+        return "" if math.isnan(value) else f"{value:.{digits}g}"
     return "" if value is None else str(value)
 
 
@@ -64,14 +66,20 @@ class Table(list):
         return "\n".join([*self.notes] + ["  ".join(c.ljust(w) for c, w in zip(line, widths)).rstrip()
                                           for line in cells])
 
+    def table_html(self, titles: Sequence[str]) -> str:
+        """The rows, below titles of the columns; its classes are those of a study's page."""
+        head = "".join(f"<th>{escape(title)}</th>" for title in titles)
+        rows = ""
+        for row in self:
+            rows += f'<tr{" class=failed" if row.get("state") == "failed" else ""}>'
+            for c in self.columns:
+                text = escape(_shown(row.get(c), self.digits))
+                rows += f'<td{" class=said" if c == "said" else ""}>{text}</td>'
+            rows += "</tr>"
+        return f"<table><thead><tr>{head}</tr></thead>{rows}</table>"
+
     def _repr_html_(self) -> str:
-        from html import escape
-        head = "".join(f"<th>{escape(c)}</th>" for c in self.columns)
-        cells = [[f"<td>{escape(_shown(row.get(c), self.digits))}</td>" for c in self.columns]
-                 for row in self]
-        rows = "".join(f"<tr>{''.join(line)}</tr>" for line in cells)
-        notes = "".join(f"<p>{escape(note)}</p>" for note in self.notes)
-        return f"{notes}<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
+        return "".join(f"<p>{escape(note)}</p>" for note in self.notes) + self.table_html(self.columns)
 
 
 class Cost(Table):

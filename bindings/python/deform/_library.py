@@ -9,7 +9,7 @@ import contextlib
 import ctypes
 import os
 import pathlib
-from typing import Any
+from typing import Any, Mapping, Sequence
 
 from . import _abi
 
@@ -188,17 +188,23 @@ def encoded(text: Any) -> bytes | None:
     return os.fspath(text).encode(errors="surrogateescape")  # names of files need not be UTF-8
 
 
-def refuse_foreign(path: pathlib.Path, mark: str) -> None:
-    """Refuses to change a file that has the mark of what is to be written there neither at its beginning nor
-    at its end."""
+def _marked(path: pathlib.Path, mark: str) -> bool | None:
+    """Whether a file has the mark, at its beginning or at its end. None: there is none, or only zeros in it,
+    of a loss of power in the first write."""
     try:
         with open(path, "rb") as file:
+            size = os.fstat(file.fileno()).st_size
             found = file.read(1 << 20)
-            file.seek(max(file.tell(), os.fstat(file.fileno()).st_size - (1 << 20)))
+            file.seek(max(file.tell(), size - (1 << 20)))
             found += file.read()
     except (FileNotFoundError, NotADirectoryError):
-        return
-    if found and mark.encode() not in found:
+        return None
+    return mark.encode() in found if len(found) < size or found.strip(b"\0") else None
+
+
+def refuse_foreign(path: pathlib.Path, mark: str) -> None:
+    """Refuses to change a file that lacks the mark of what is to be written there."""
+    if _marked(path, mark) is False:
         raise FileError(f"{path}: another program wrote this file, or an earlier deform, and it stays as it "
                         f"is; give another folder (--out), or move the file", "DFM_E_IO")
 
@@ -216,6 +222,16 @@ def write_whole(path: pathlib.Path, data: bytes, mark: str = "") -> None:
     finally:
         with contextlib.suppress(OSError):
             part.unlink()
+
+
+def clear_own(folder: pathlib.Path, marks: Mapping[str, str], written: Sequence[pathlib.Path]) -> None:
+    """Takes away what an earlier call has left, which would look like results of this one. marks: of its
+    files, by their names; a file of another program stays."""
+    for name, mark in marks.items():
+        if folder / name not in written:
+            with contextlib.suppress(OSError):  # a folder, or not to be read: not its own
+                if _marked(folder / name, mark):
+                    (folder / name).unlink()
 
 
 def read_text(function: Any, *arguments: Any) -> str:

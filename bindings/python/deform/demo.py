@@ -74,14 +74,21 @@ def table(runs: dict[str, dict[str, Any]]) -> None:
 
 def demo(command: Any, scene: Any, out: pathlib.Path) -> None:
     out.mkdir(parents=True, exist_ok=True)
+    picture, summary = out / "two_cylinders.png", out / "summary.json"
+    own = summary.exists() and b'two_cylinders.png"' in summary.read_bytes()
+    for file in (summary, picture):
+        if file.exists() and not own:
+            sys.exit(f"demo: {file}: another program wrote this file, and it stays as it is; give another "
+                     f"folder, or move the file")
     runs = {label: simulate(command, scene, out, label, options) for label, options in RUNS.items()}
-    picture = out / "two_cylinders.png"
+    partial = out / "summary.json.part"
+    told = {"scene": str(scene), "picture": str(picture), "runs": runs}
+    partial.write_text(json.dumps(told, indent=2) + "\n")
+    partial.replace(summary)
     run(command, "montage", *(part for label, r in runs.items() for part in ("--row", label, *r["pictures"])),
         "--out", picture)
-    (out / "summary.json").write_text(json.dumps({"scene": str(scene), "picture": str(picture), "runs": runs},
-                                                 indent=2) + "\n")
     table(runs)
-    print(f"\npicture {picture}, figures {out}/summary.json")
+    print(f"\npicture {picture}, figures {summary}")
 
 
 if __name__ == "__main__":

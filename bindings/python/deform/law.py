@@ -228,6 +228,9 @@ class Bridge:
             if given.key in _GIVEN or not given.key.isidentifier():
                 raise ArgumentError(f"{law.id}: a parameter has the key '{given.key}'; expected a Python "
                                     f"name that is none of {', '.join(_GIVEN)}", "DFM_E_ARG")
+            if given.names:
+                raise ArgumentError(f"{law.id}: parameter '{given.key}' has names; a law in Python takes "
+                                    "numbers", "DFM_E_ARG")
         rows = (_abi.dfm_param * max(len(law.parameters), 1))()
         for row, given in zip(rows, law.parameters):
             row.key, row.label, row.unit = (encoded(t) for t in (given.key, given.label, given.unit))

@@ -1,6 +1,7 @@
 """Pictures of a world without a display, by the renderer of the command."""
 from __future__ import annotations
 
+import collections
 import contextlib
 import ctypes
 import json
@@ -14,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Iterable, Sequence
 
 import numpy as np
 
-from ._library import PATH, ArgumentError, Error, UnsupportedError, at_fork, write_whole
+from ._library import PATH, ArgumentError, Error, UnsupportedError, at_fork, error, write_whole
 from .body import vector
 
 if TYPE_CHECKING:
@@ -22,10 +23,11 @@ if TYPE_CHECKING:
 
 _lock = threading.Lock()
 _module: Any = None
-_renderers: dict[tuple[int, int], int] = {}
+_renderers: collections.OrderedDict[tuple[int, int], ctypes.c_void_p] = collections.OrderedDict()
 _forked = False  # from a process that has drawn
 _MODULE = "libdeform_python.so"
 _LARGEST = 8192   # pixels, of the renderer
+_KEPT = 4         # renderers, of the sizes that were drawn last
 _THROUGH = 0.45   # of a contact patch that something hides
 _ROUNDING = 1e-10  # strains, and displacements for coordinates of 1 m, that are drawn as zero
 # what colors may mean: title and unit
@@ -57,8 +59,9 @@ def _native() -> Any:
         module = ctypes.CDLL(str(path))
         p, u, t, d = ctypes.c_void_p, ctypes.c_uint32, ctypes.c_char_p, ctypes.c_double
         for name, result, arguments in (
-                ("create", p, [u, u, p, ctypes.c_size_t]), ("palette", None, [u, p]),
-                ("map", None, [u, u, p]), ("begin", None, [p, p, u]), ("legend", None, [p, u, d, d, t, t]),
+                ("create", ctypes.c_int, [u, u, p, p, ctypes.c_size_t]), ("destroy", None, [p]),
+                ("palette", None, [u, p]), ("map", None, [u, u, p]), ("begin", None, [p, p, u]),
+                ("legend", None, [p, u, d, d, t, t]),
                 ("surface", None, [p, u, p, u, p, p, p, d]), ("shape", None, [p, u, p, p, p]),
                 ("camera", None, [p, p, p]), ("text", None, [p, t]),
                 ("draw", ctypes.c_int, [p, p, p, ctypes.c_size_t])):
@@ -167,7 +170,7 @@ class Solid:
     """A shape of an obstacle where it is: kind as DFM_SHAPE_*, pose [7], axis [3], size [3]; or triangles."""
 
     def __init__(self, kind: int, pose: np.ndarray, axis: np.ndarray, size: Sequence[float],
-                 points: np.ndarray | None = None, triangles: np.ndarray | None = None, handle: int = 0):
+                 points: np.ndarray, triangles: np.ndarray, handle: int):
         self.kind, self.pose, self.axis, self.size, self.handle = kind, pose, axis, list(size), handle
         self.points, self.triangles = points, triangles
 
@@ -191,7 +194,7 @@ def solids(world: World) -> list[Solid]:
         pose = np.concatenate([position, rotation if np.any(rotation) else [0, 0, 0, 1]])
         size = (list(definition.half_size) if definition.shape == 2 else
                 [definition.radius, definition.half_length, 0])
-        points = triangles = None
+        points, triangles = np.empty((0, 3)), np.empty((0, 3), np.uint32)
         if definition.ntriangle:
             shape = (ctypes.c_double * (3 * definition.npoint)).from_address(definition.points)
             rest = np.frombuffer(shape, dtype=np.float64).reshape(-1, 3)
@@ -217,28 +220,34 @@ def draw(surfaces: Iterable[tuple[Any, Any, Sequence[float], Any]], obstacles: I
         raise ArgumentError("a camera has both eye and look_at", "DFM_E_ARG")
     native, why = _native(), ctypes.create_string_buffer(512)
     with _lock:
-        picture = _renderers.get(key) or native.deform_picture_create(width, height, why, len(why))
-        if not picture:
-            raise UnsupportedError(f"no pictures: {why.value.decode()}", "DFM_E_UNSUPPORTED")
-        _renderers[key] = picture
+        if key not in _renderers:
+            made = ctypes.c_void_p()
+            if status := native.deform_picture_create(width, height, ctypes.byref(made), why, len(why)):
+                raise error(status, f"no pictures: {why.value.decode()}")
+            _renderers[key] = made
+        _renderers.move_to_end(key)
+        picture = _renderers[key]
+        if len(_renderers) > _KEPT:
+            native.deform_picture_destroy(_renderers.popitem(last=False)[1])
         native.deform_picture_begin(picture, vector(upright.at(t), "up"), upright.tilts)
         if color in COLORS:
             title, unit = (word.encode() for word in COLORS[color])
             native.deform_picture_legend(picture, int(color == "displacement"), *value_range, title, unit)
-        for points, triangles, own, values in surfaces:
+        others = list(obstacles)
+        meshes = [(solid.points, solid.triangles, (0.72, 0.73, 0.75), None) for solid in others
+                  if len(solid.points)]
+        read = []  # while the picture is drawn
+        for points, triangles, own, values in [*surfaces, *meshes]:
             xyz = np.ascontiguousarray(points, dtype=np.float64)
             tri = np.ascontiguousarray(triangles, dtype=np.uint32)
             scalar = None if values is None else np.ascontiguousarray(values, dtype=np.float32)
+            read.append((xyz, tri, scalar))
             native.deform_picture_surface(picture, len(xyz), xyz.ctypes.data, len(tri), tri.ctypes.data,
                                           vector(own, "color"),
                                           None if scalar is None else scalar.ctypes.data,
                                           _THROUGH if color == "contact" else 0.0)
-        for solid in obstacles:
-            if solid.points is not None and solid.triangles is not None:
-                native.deform_picture_surface(picture, len(solid.points), solid.points.ctypes.data,
-                                              len(solid.triangles), solid.triangles.ctypes.data,
-                                              vector((0.72, 0.73, 0.75), "color"), None, 0.0)
-            else:
+        for solid in others:
+            if not len(solid.points):
                 native.deform_picture_shape(picture, solid.kind, vector(solid.pose, "pose", 7),
                                             vector(solid.axis, "axis"), vector(solid.size, "size"))
         if eye is not None:
@@ -246,14 +255,15 @@ def draw(surfaces: Iterable[tuple[Any, Any, Sequence[float], Any]], obstacles: I
         for line in texts:
             native.deform_picture_text(picture, line.encode("ascii", "replace"))
         rgb = np.empty((height, width, 3), dtype=np.uint8)
-        if not native.deform_picture_draw(picture, rgb.ctypes.data, why, len(why)):
-            raise UnsupportedError(f"no picture: {why.value.decode()}", "DFM_E_UNSUPPORTED")
+        if status := native.deform_picture_draw(picture, rgb.ctypes.data, why, len(why)):
+            raise error(status, f"no picture: {why.value.decode()}")
     return Picture(rgb)
 
 
 def _nearest(body: Any) -> np.ndarray:
     """The point that is nearest to each surfel, [nsurfel]."""
-    points, surfels = body.points, body.positions
+    origin = body.points[:1]  # squares of places far from it have no digits for distances
+    points, surfels = body.points - origin, body.positions - origin
     rows = max(1, 4_000_000 // max(len(points), 1))
     squares = (points**2).sum(axis=1)
     return np.concatenate([(squares - 2 * surfels[i:i + rows] @ points.T).argmin(axis=1)
@@ -308,10 +318,15 @@ def scaled(values: np.ndarray | None, value_range: tuple[float, float], color: s
     return np.where(values == 0, np.nan, out) if color == "contact" else out
 
 
-def ends(value_range: Sequence[float] | None, values: Iterable[np.ndarray | None]) -> tuple[float, float]:
-    """The values at the ends of the colors: those given, or 0 and the largest."""
+def largest(values: Iterable[np.ndarray | None]) -> float:
+    """0 where there is none."""
+    return max((float(v.max(initial=0)) for v in values if v is not None), default=0.0)
+
+
+def ends(value_range: Sequence[float] | None, top: float) -> tuple[float, float]:
+    """The values at the ends of the colors: those given, or 0 and top."""
     if value_range is None:
-        return 0.0, max((float(v.max(initial=0)) for v in values if v is not None), default=0.0)
+        return 0.0, top
     low, high = vector(value_range, "color_range", 2)
     if not low < high:
         raise ArgumentError(f"color_range is {low:g} to {high:g}; the second value must be larger",
@@ -329,7 +344,7 @@ def picture(world: World, *, size: tuple[int, int] = (960, 720), color: str = "b
     values = [body_values(b, color) for b in bodies]
     if all(v is None for v in values):
         color = "body"
-    span = ends(color_range, values)
+    span = ends(color_range, largest(values))
     surfaces = [(b.positions, b.triangles, palette(i), scaled(v, span, color))
                 for i, (b, v) in enumerate(zip(bodies, values))]
     return draw(surfaces, solids(world), size=size, eye=eye, look_at=look_at, color=color, value_range=span,

@@ -15,7 +15,8 @@ from ._arrays import row_type
 from ._context import Context, default_context
 from ._library import ArgumentError, OfThisProcess, check, encoded, lib, quick, read_text, sized
 from ._values import KindError, json_of, real, whole
-from .picture import Picture, Solid, Upright, body_values, draw, ends, palette, scaled, solids, upright_of
+from .picture import (Picture, Solid, Upright, body_values, draw, ends, largest, palette, scaled, solids,
+                      upright_of)
 from .query import write_scene
 from .world import Trouble, World
 
@@ -152,6 +153,7 @@ class Run:
     def __init__(self, color: str, camera: Any, color_range: Any, upright: Upright):
         self.color, self.camera, self.color_range, self.upright = color, camera, color_range, upright
         self.frames: list[Frame] = []
+        self._top = 0.0
         self.triangles: dict[str, np.ndarray] = {}
         self.steps = 0
         self.trouble = Trouble(0)
@@ -180,12 +182,14 @@ class Run:
                 raise ArgumentError(f"body '{name}' is gone: begin another film", "DFM_E_ARG")
         stats = world.stats
         self.steps = int(stats.steps)
+        values = {name: body_values(bodies[name], self.color) if name in bodies else None
+                  for name in self.triangles}
+        self._top = max(self._top, largest(values.values()))
         self.frames.append(Frame(
             world.time, {name: bodies[name].positions.astype(np.float32) if name in bodies
                          else np.empty((0, 3), np.float32) for name in self.triangles},
-            {name: body_values(bodies[name], self.color) if name in bodies else None
-             for name in self.triangles}, solids(world), dict(probes or {}), int(stats.contacts),
-            int(stats.sticking), {name: self._surface(name, bodies.get(name)) for name in self.triangles}))
+            values, solids(world), dict(probes or {}), int(stats.contacts), int(stats.sticking),
+            {name: self._surface(name, bodies.get(name)) for name in self.triangles}))
 
     def _surface(self, name: str, body: Any) -> np.ndarray:
         """Triangles now: those of the frame before where no cut has changed them."""
@@ -210,18 +214,18 @@ class Run:
         return np.stack([frame.positions[body] for frame in self.frames])
 
     def top(self) -> float:
-        """The largest value by which anything is colored, of all frames."""
-        return ends(None, (v for frame in self.frames for v in frame.values.values()))[1]
+        """The largest value by which anything is colored, of all frames recorded."""
+        return self._top
 
     def value_range(self) -> tuple[float, float]:
-        """The values at the ends of the colors: color_range, or 0 and the largest of all frames."""
-        return ends(self.color_range, (v for frame in self.frames for v in frame.values.values()))
+        """The values at the ends of the colors: color_range, or 0 and top()."""
+        return ends(self.color_range, self._top)
 
     def picture(self, frame: int = -1, *, size: tuple[int, int] = (960, 720), eye: Any = None,
                 look_at: Any = None) -> Picture:
         """A frame, drawn; negative numbers count from the end."""
         shown, span = self.frames[frame], self.value_range()
-        if eye is None and self.camera is not None:
+        if eye is None and look_at is None and self.camera is not None:
             eye, look_at = self.camera
         surfaces = [(shown.positions[name], shown.triangles[name], palette(i),
                      scaled(shown.values[name], span, self.color)) for i, name in enumerate(self.triangles)]

@@ -43,15 +43,12 @@ def _surface(number: int, shape: int, points: np.ndarray, triangles: np.ndarray)
 
 def _thing(number: int, solid: Solid) -> list[bytes]:
     """An obstacle or rigid body, which has the same shape in all frames."""
-    points, triangles = np.empty((0, 3)), np.empty((0, 3))
-    if solid.points is not None and solid.triangles is not None:
-        back = solid.pose[3:] * (-1, -1, -1, 1)
-        points, triangles = turned(back, solid.points - solid.pose[:3]), solid.triangles
+    points = turned(solid.pose[3:] * (-1, -1, -1, 1), solid.points - solid.pose[:3])
     radius, half = (solid.size[0], solid.size[1]) if solid.kind in (1, 3) else (0, 0)
     box = solid.size if solid.kind == 2 else (0, 0, 0)
-    numbers = number, 1, len(points), len(triangles), solid.kind
+    numbers = number, 1, len(points), len(solid.triangles), solid.kind
     return [_chunk(b"OBST", struct.pack("<5I5f", *numbers, radius, half, *box), _named("")),
-            *_surface(number, 1, points, triangles)]
+            *_surface(number, 1, points, solid.triangles)]
 
 
 def _moved(number: int, shape: int, moved: np.ndarray) -> bytes:
@@ -62,18 +59,18 @@ def _moved(number: int, shape: int, moved: np.ndarray) -> bytes:
                   struct.pack("<I", 0), rows.astype("<u2"))
 
 
-def _values(run: Run, values: np.ndarray) -> np.ndarray:
+def _values(color: str, span: tuple[float, float], values: np.ndarray) -> np.ndarray:
     """Levels from 1; 0: the body's own color."""
-    low, high = run.value_range()
+    low, high = span
     share = (values - low) / (high - low) if high > low else 0 * values
     levels = np.rint(1 + 254 * np.clip(share, 0, 1)).astype("u1")
-    return np.where(values == 0, 0, levels).astype("u1") if run.color == "contact" else levels
+    return np.where(values == 0, 0, levels).astype("u1") if color == "contact" else levels
 
 
 def packets_of(run: Run) -> bytes:
     """The run in the format of doc/reference/stream.md. A body whose triangles change is told again, what is
     added later when it is there."""
-    out = []
+    out, span = [], run.value_range()
     numbers: dict[int, int] = {}  # of obstacles, behind those of bodies, by their handles
     known: dict[str, tuple[np.ndarray, np.ndarray]] = {}  # triangles, places that displacements count from
     shapes: dict[str, int] = {}
@@ -93,7 +90,7 @@ def packets_of(run: Run) -> bytes:
             surfaces.append(_moved(number, shapes[name], points - known[name][1]))
             if values is not None:
                 surfaces.append(_chunk(b"VALU", struct.pack("<4I", *listed[-1], 0, len(points)),
-                                       _values(run, values)))
+                                       _values(run.color, span, values)))
         for solid in frame.obstacles:
             if solid.handle not in numbers:
                 numbers[solid.handle] = len(run.triangles) + len(numbers) + 1

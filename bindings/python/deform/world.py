@@ -695,14 +695,6 @@ class World(Queries, Reports, Tools, OfThisProcess):
         return self._list("stats", lambda: Report(quick.dfm_world_get_stats, self.handle,
                                                   _abi.dfm_world_stats))
 
-    def ray(self, origin: Sequence[float], direction: Sequence[float],
-            max_distance: float = np.inf) -> dict[str, Any] | None:
-        """The first surface that a ray meets: owner, triangle (of a body, or of the mesh of an obstacle; None
-        of a shape in closed form), distance m, point [3] m, normal [3]; or None."""
-        hit = self.query_ray(origin, direction, max_distance)
-        words = ("owner", "triangle", "distance", "point", "normal")
-        return None if hit is None else {key: getattr(hit, key) for key in words}
-
     def snapshot(self) -> bytes:
         """All that a later result depends on; restore() takes it, in another process too."""
         self.free()

@@ -10,12 +10,12 @@ from typing import Any, Callable, Mapping, Sequence
 import numpy as np
 
 from .._command import Table
-from .._library import ArgumentError, Error, UnsupportedError, refuse_foreign, write_whole
+from .._library import ArgumentError, Error, UnsupportedError, clear_own, refuse_foreign, write_whole
 from .._values import finite_or_none
 from . import plots
 from .engine import Failed
 from .executors import Dask, Local, executor as named_executor
-from .page import page, table
+from .page import page
 from .spec import Residual, Study, read_study
 from .statistics import Spread
 from .store import require_posix
@@ -65,8 +65,9 @@ class Fit(Table):
             write_whole(written[-1], figures["fit"], plots.MARK)
         except UnsupportedError as missing:
             sentences.append(str(missing))
-        write_whole(written[1], page(f"Fit {self.study.name}", sentences, figures,
-                                     [table(self, self.columns, {})]), MARKS["fit.html"])
+        write_whole(written[1], page(f"Fit {self.study.name}", sentences, figures, self, {}),
+                    MARKS["fit.html"])
+        clear_own(self.folder, MARKS, written)
         return written
 
 

@@ -90,9 +90,10 @@ def maps(data: Columns) -> Any:
     axes = drawn.subplots(high, wide, squeeze=False)
     x, y = data.of(first.name), data.of(second.name)
     across, up = np.unique(x), np.unique(y)
+    full = len(set(zip(x, y))) == len(across) * len(up) == len(x)
     for axis, quantity in zip(axes.flat, data.quantities):
         z = data.of(quantity)
-        if len(across) * len(up) == len(z) and min(len(across), len(up)) > 1:
+        if full and min(len(across), len(up)) > 1:
             grid = np.full((len(up), len(across)), np.nan)
             grid[np.searchsorted(up, y), np.searchsorted(across, x)] = z
             colors = axis.pcolormesh(_edges(across, first.log), _edges(up, second.log), grid, cmap="viridis")

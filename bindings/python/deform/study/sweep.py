@@ -6,11 +6,11 @@ from contextlib import ExitStack, closing
 from typing import Any, Sequence
 
 from .._command import Table
-from .._library import ArgumentError, UnsupportedError, write_whole
+from .._library import ArgumentError, UnsupportedError, clear_own, write_whole
 from . import plots, tables
 from .design import points
 from .executors import executor as named_executor
-from .page import page, table
+from .page import page
 from .progress import Progress
 from .spec import Study, read_study
 from .store import Store, require_posix
@@ -23,6 +23,8 @@ MARKS = {"sweep.csv": ",state,said,seconds", "sweep.html": "<title>Sweep ", "swe
 class Sweep(Table):
     """The runs of a sweep as rows: parameters and quantities by name, state ("done", "failed", "open"), said
     (the sentence of a run that failed) and seconds. units: {name: unit}; folder: where its files are."""
+
+    digits = 5
 
     def __init__(self, study: Study, rows: Sequence[dict[str, Any]], folder: pathlib.Path):
         names = [p.name for p in study.parameters] + list(study.quantities)
@@ -57,8 +59,9 @@ class Sweep(Table):
             written.append(self.folder / f"{name}.png")
             write_whole(written[-1], data, plots.MARK)
         written.append(self.folder / "sweep.html")
-        write_whole(written[-1], page(f"Sweep {self.study.name}", sentences, figures,
-                                      [table(self, self.columns, self.units)]), MARKS["sweep.html"])
+        write_whole(written[-1], page(f"Sweep {self.study.name}", sentences, figures, self, self.units),
+                    MARKS["sweep.html"])
+        clear_own(self.folder, MARKS, written)
         if parquet:
             written.append(self.folder / "sweep.parquet")
             tables.write_parquet(written[-1], self, self.columns, self.units, MARKS["sweep.parquet"])

@@ -73,9 +73,3 @@ def write_parquet(path: pathlib.Path, rows: Rows, columns: Sequence[str], units:
     schema = arrow.schema(fields, metadata={"written_by": mark})  # stands uncompressed at the file's end
     arrow.parquet.write_table(arrow.Table.from_arrays(arrays, schema=schema), file)
     write_whole(path, file.getvalue(), mark)
-
-
-def shown(value: Any) -> str:
-    if isinstance(value, float):
-        return "" if math.isnan(value) else f"{value:.5g}"
-    return "" if value is None else str(value)
