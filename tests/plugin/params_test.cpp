@@ -56,7 +56,7 @@ TEST_F(Params, Given_TakesTheRowsPlace) {
 TEST_F(Params, UnknownKey_NamesTheNearest) {
   const Packed p = pack(drag(), {{"axs", {0, 0, 1}}});
   EXPECT_EQ(p.status, DFM_E_ARG);
-  EXPECT_EQ(p.why, "org.tiny.drag has no parameter \"axs\"; did you mean \"axis\"?; it has c, axis, steps");
+  EXPECT_EQ(p.why, "org.tiny.drag has no parameter \"axs\"; did you mean \"axis\"?; it has: c, axis, steps");
 }
 
 TEST_F(Params, WrongWidth_IsRefused) {

@@ -133,8 +133,8 @@ enum {
   DFM_TROUBLE_BUDGET = 256,
   DFM_TROUBLE_INTERRUPTED = 512 /* DFM_DISCARD because of dfm_world_interrupt */
 };
-/** Advances the world by dt. A step longer than the stable one is divided into equal sub-steps, each with a
- * contact solve; their number is 1, 2, 3 or (4, 5, 6, 7) 2^k.
+/** Advances the world by dt. A step that is too long (DFM_TROUBLE_SUBSTEPS) is divided into equal sub-steps,
+ * each with a contact solve; their number is 1, 2, 3 or (4, 5, 6, 7) 2^k.
  * @param dt       s, at least 1e-9, and 1e-9 for each meter of the largest coordinate: below that the
  *                 rounding of positions dominates
  * @param trouble  out, DFM_TROUBLE_* bits; may be NULL

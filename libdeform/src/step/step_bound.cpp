@@ -222,6 +222,7 @@ Vec3 speed_of(const World &w, const Obstacle &o, Vec3 p, double dt) {
 }  // namespace
 
 double contact_step(const World &w, double dt) {
+  constexpr double kMostByContact = 16;
   constexpr double kAny = std::numeric_limits<double>::infinity();
   if (std::isfinite(w.bound.step) || w.def.max_work || w.prescribed.is_static()) return kAny;
   const ContactStore &s = w.store;
@@ -240,7 +241,8 @@ double contact_step(const World &w, double dt) {
     }
     if (edge > 0) rate = std::max(rate, -dot(by, load3(&s.normal[3 * size_t{m}])) / edge);
   }
-  return rate > 0 ? 1 / rate : kAny;
+  // by then lists are short
+  return rate > 0 ? std::max(1 / rate, dt / kMostByContact) : kAny;
 }
 
 bool bound_expired(const World &w) { return w.bound.age >= kBoundEvery; }

@@ -18,7 +18,9 @@ constexpr double kAlong = 1e-3;
 
 // m, from its position to no point of it; not of a plane
 inline double ball_around(const ObstacleView &v) {
-  return v.shape == Shape::box ? norm(v.half_size) : v.extent + v.radius + v.half_length;
+  if (v.shape == Shape::box) return norm(v.half_size);
+  if (v.shape == Shape::sphere) return v.radius;
+  return v.shape == Shape::capsule ? v.radius + v.half_length : v.extent;
 }
 
 // Axis-parallel.

@@ -190,9 +190,11 @@ bool ToolTouch::stays_out(World &w, StepContext &step) {
   }
   find_near(step);
   double first = HUGE_VAL;
-  each_pair(w, step, [&](const Pair &pair, ToolShape &a, ToolShape &b, Side, Side) {
-    if (!pair.jaw && goes_far(pair)) first = std::min(first, meeting(w, step, pair, a, b));
-  });
+  const auto far = [&](const Pair &pair) { return !pair.jaw && goes_far(pair); };
+  if (std::ranges::any_of(near_, [&](uint32_t k) { return far(pairs_[k]); }))
+    each_pair(w, step, [&](const Pair &pair, ToolShape &a, ToolShape &b, Side, Side) {
+      if (far(pair)) first = std::min(first, meeting(w, step, pair, a, b));
+    });
   if (!(first <= 1) || !(step.h > kMinSubstep * step.length.planned) || !may_repeat(w, step)) {
     warn_driven(w, step);
     return true;
