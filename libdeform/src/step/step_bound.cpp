@@ -241,7 +241,7 @@ double contact_step(const World &w, double dt) {
     }
     if (edge > 0) rate = std::max(rate, -dot(by, load3(&s.normal[3 * size_t{m}])) / edge);
   }
-  // by then lists are short
+  // more parts shorten the lists by little, and all bodies pay for each
   return rate > 0 ? std::max(1 / rate, dt / kMostByContact) : kAny;
 }
 
