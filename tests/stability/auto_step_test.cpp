@@ -1,5 +1,6 @@
 // Steps of what dfm_world_stable_step answers, asked anew before each ("step": "auto"): they change rarely,
 // and undamped bodies keep their energy. The whole study: tests/bench/step_study.cpp.
+#include "obstacle.h"
 #include "step_energy.h"
 #include "support.h"
 
@@ -39,29 +40,40 @@ TEST(AutoStep, ThesisCylinderThatSpins_KeepsItsEnergy) {
   keeps({"cyl_coarse", mesh, "spin", 1}, 8000);
 }
 
+namespace {
+
+// By whose edges the reach of contacts is measured; kReach: m, in a step without sub-steps.
+constexpr double kStep = 1.0 / 60, kFall = 6, kReach = 2 * kFall * kStep, kLeastEdge = 0.02;
+
+dfm_body fast_block(test::Context &context, dfm_world w, const char *model, double z, double v) {
+  test::BodyOptions o;
+  o.model = model;
+  o.position = {0, 0, z};
+  const dfm_body body = test::make_body(context, w, "beam", {0.1, 0.1, 0.1}, 60, o);
+  test::set_velocity(body, {0, 0, v});
+  return body;
+}
+
+uint32_t substeps_of_step(dfm_world w) {
+  test::ok(dfm_world_step(w, kStep, nullptr));
+  return test::stats(w).last_substeps;
+}
+
+}  // namespace
+
 // A body that goes with its floor does so in whole steps, however fast.
-TEST(Substeps, WhatIsNear_ComesNearerByNoMoreThanAnEdge) {
-  constexpr double kStep = 1.0 / 60, kFall = 6;
+TEST(Substeps, OfABodyThatFallsOnAMesh_ReachAsFarAsAnEdge) {
   for (const char *model : {"shape_matching", "modal"}) {
     test::Context context;
     const dfm_world w = test::make_world(context);
     test::set_friction(w, 0.8);
-    dfm_obstacle_def d = dfm_obstacle_def_default();
-    d.shape = DFM_SHAPE_BOX;
-    std::fill_n(d.half_size, 3, 1.0);
-    d.pose.position[2] = -1;
-    dfm_obstacle floor = 0;
-    test::ok(dfm_obstacle_create(w, &d, &floor));
-    test::BodyOptions o;
-    o.model = model;
-    o.position = {0, 0, 0.2};
-    const dfm_body body = test::make_body(context, w, "beam", {0.1, 0.1, 0.1}, 60, o);
-    test::set_velocity(body, {0, 0, -kFall});
+    const auto flat = test::height_field(1, 40, [](double, double) { return 0.0; });
+    const dfm_obstacle floor = test::add_mesh(w, "floor", flat);
+    const dfm_body body = fast_block(context, w, model, 0.2, -kFall);
     uint32_t most = 0;
     for (int k = 0; k < 90; ++k) {
       const std::string before = test::snapshot(w);
-      test::ok(dfm_world_step(w, kStep, nullptr));
-      const uint32_t n = test::stats(w).last_substeps;
+      const uint32_t n = substeps_of_step(w);
       if (n > most) {  // the same after a restore
         const uint64_t hash = dfm_world_hash(w);
         test::ok(dfm_world_restore(w, before.data(), before.size()));
@@ -70,16 +82,35 @@ TEST(Substeps, WhatIsNear_ComesNearerByNoMoreThanAnEdge) {
       }
       most = std::max(most, n);
     }
-    EXPECT_GE(most, 2u) << model;
-    EXPECT_LE(most, uint32_t(std::ceil(kFall * kStep / 0.02))) << model;
+    EXPECT_GE(most, 4u) << model;
+    EXPECT_LE(most, uint32_t(std::ceil(kReach / kLeastEdge))) << model;
     EXPECT_EQ(test::stats(w).last_substeps, 1u) << model;
+    dfm_pose pose = dfm_obstacle_def_default().pose;
     for (int k = 1; k <= 120; ++k) {  // down, to 6 m/s at 4 m/s2, then on
       const double t = k * kStep, ramp = std::min(t, 1.5);
-      d.pose.position[2] = -1 - (2 * ramp * ramp + 6 * (t - ramp));
-      test::ok(dfm_obstacle_move_to(floor, &d.pose));
-      test::ok(dfm_world_step(w, kStep, nullptr));
-      EXPECT_EQ(test::stats(w).last_substeps, 1u) << model << ", step " << k;
+      pose.position[2] = -(2 * ramp * ramp + 6 * (t - ramp));
+      test::ok(dfm_obstacle_move_to(floor, &pose));
+      EXPECT_EQ(substeps_of_step(w), 1u) << model << ", step " << k;
     }
     EXPECT_NEAR(test::measure(body).velocity[2], -6, 0.2) << model;
+  }
+}
+
+// Before there is any contact between them; not of two that fly together, nor of two that pass far away.
+TEST(Substeps, OfBodiesThatMeetInAStep_AreTakenFromTheFirst) {
+  for (const char *model : {"shape_matching", "modal"}) {
+    test::Context context;
+    const auto substeps = [&](double height, double of_lower) {
+      const dfm_world w = test::make_world(context);
+      fast_block(context, w, model, height, -kFall);
+      fast_block(context, w, model, 0, of_lower);
+      return substeps_of_step(w);
+    };
+    const uint32_t n = substeps(0.15, 0);
+    EXPECT_GE(n, 4u) << model;
+    EXPECT_LE(n, uint32_t(std::ceil(kReach / kLeastEdge))) << model;
+    EXPECT_GE(substeps(0.25, kFall), 2 * n - 1) << model;
+    EXPECT_EQ(substeps(0.15, -kFall), 1u) << model;
+    EXPECT_EQ(substeps(1, 0), 1u) << model;
   }
 }

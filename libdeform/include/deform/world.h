@@ -111,7 +111,7 @@ DFM_API dfm_status dfm_world_set_sleep(dfm_world world, bool sleep);
 /* ---- step ---------------------------------------------------------------------------------------------- */
 /** Trouble in a step; each bit with its remedy. */
 enum {
-  /* dt is above the stable step, or what is near comes nearer by more than an edge: sub-steps were taken.
+  /* dt is above the stable step, or too long for bodies that meet fast: sub-steps were taken.
    * With DFM_DISCARD it needs more than max_substeps: soften the material, coarsen the mesh, shorten dt */
   DFM_TROUBLE_SUBSTEPS = 1,
   DFM_TROUBLE_UNCONVERGED = 2, /* no answer to contact was found: contacts exclude each other, or max_work */

@@ -19,6 +19,7 @@
 // is left of the residual. Sources: Alart and Curnier 1991 (Newton for mixed formulations of frictional
 // contact), Rockafellar 1976 (augmented Lagrangians and the proximal point algorithm).
 #pragma once
+#include <algorithm>
 #include <span>
 
 #include "body/implicit_system.h"
@@ -145,11 +146,15 @@ class ContactNewton {
   Vec3 entry_times(uint32_t e, const double *x) const;
   Vec3 times(uint32_t k, const double *x, size_t stride) const;  // J_k x
   void add_transposed(uint32_t k, Vec3 z, double *to) const;
-  // f(entry of the node, entry of the same row) for all such pairs, by row
-  template <class F>
-  void each_neighbor(uint32_t node, const F &f) const {
+  bool is_open(uint32_t k) const {  // G of this row is zero
+    return std::all_of(&slope_[9 * size_t{k}], &slope_[9 * size_t{k}] + 9, [](double g) { return g == 0; });
+  }
+  // f(entry of the node, entry of the same row) for all such pairs, by row, of rows that are `wanted`
+  template <class Wanted, class F>
+  void each_neighbor(uint32_t node, const Wanted &wanted, const F &f) const {
     for (uint32_t p = begin_entry_[node]; p < begin_entry_[node + 1]; ++p) {
       const uint32_t own = entry_by_node_[p], k = row_of_[own];
+      if (!wanted(k)) continue;
       for (uint32_t e = entry_[k]; e < entry_[k + 1]; ++e) f(own, e);
     }
   }

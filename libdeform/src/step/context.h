@@ -14,6 +14,7 @@
 #include "contact/renewal.h"
 #include "contact/store.h"
 #include "geometry/views.h"
+#include "math/extent.h"
 #include "narrow/narrow_phase.h"
 #include "state/world.h"
 #include "step/budget.h"
@@ -66,6 +67,11 @@ struct StepContext {
   std::vector<std::unique_ptr<SelfBody>> self_bodies;  // in id order; those that may touch themselves
 
   // motion
+  struct Motion {
+    Extent place, velocity;  // m, m/s, of its surfels
+    double edge;             // m
+  };
+  std::vector<Motion> spans;  // [bodies] of contact_step()
   Array<Driven> driven;
   // predict
   Array<double> free_kinetic;  // [bodies] J, without contact; of this sub-step

@@ -19,6 +19,7 @@
 #include "plugin/context.h"
 #include "state/bounds.h"
 #include "state/world.h"
+#include "step/contact_step.h"
 #include "step/context.h"
 #include "step/impact.h"
 #include "step/messages.h"
@@ -271,8 +272,8 @@ dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
   if (!(least_sub_steps(w, dt) <= w.def.max_substeps) && end_impact(w)) prepare_bound(w);
   if (!(least_sub_steps(w, dt) <= w.def.max_substeps)) return refuse_step(w, dt, trouble);
   const double size_before = w.sizes.cut.size;
-  const uint32_t n = static_cast<uint32_t>(
-      std::min<double>(w.def.max_substeps, choose_substeps(w.sizes, dt, w.bound.step, contact_step(w, dt))));
+  const uint32_t n = static_cast<uint32_t>(std::min<double>(
+      w.def.max_substeps, choose_substeps(w.sizes, dt, w.bound.step, contact_step(w, step, dt))));
   w.watch.size_before = differ(w.sizes.cut.size, size_before) ? size_before : 0;
   plan_work(w, step, n);
   if (n > 1) *trouble |= DFM_TROUBLE_SUBSTEPS;

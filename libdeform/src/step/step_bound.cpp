@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "core/error.h"
-#include "dynamics/rigid/rigid_set.h"
 #include "dynamics/symplectic_euler.h"
 #include "math/elementary.h"
 #include "math/turn.h"
@@ -195,54 +194,6 @@ void bring_check_forward(World &w, const Body &b) {
   uint32_t n = 1;
   while (strain_of_fall(w, b, n + 1) <= kBoundStrain) ++n;
   w.bound.age = std::max(w.bound.age, kBoundEvery - n);
-}
-
-namespace {
-
-// m/s, of a corner of this feature; by the phyxels, since a step that was taken back leaves its surface.
-Vec3 speed_of(const Body &b, uint8_t type, uint32_t feature) {
-  const Surface &s = b.surface;
-  const uint32_t surfel = type == 0   ? feature
-                          : type == 1 ? s.edge[2 * size_t{feature}]
-                                      : s.tri[3 * size_t{feature}];
-  return s.sum(surfel, b.p.v.data());
-}
-
-// m/s at p, in a step of dt.
-Vec3 speed_of(const World &w, const Obstacle &o, Vec3 p, double dt) {
-  if (is_moved(o)) {
-    const dfm_rigid_state &s = o.rigid->state[o.rigid_body];
-    return load3(s.velocity) + cross(load3(s.spin), p - load3(s.position));
-  }
-  if (!o.has_target && !o.moves()) return {};
-  const Pose end = o.has_target ? o.target : o.pose_at_time(w.time + dt);
-  return (1 / dt) * (place(end, rotate_back(o.pose.rotation, p - o.pose.position)) - p);
-}
-
-}  // namespace
-
-double contact_step(const World &w, double dt) {
-  constexpr double kMostByContact = 16;
-  constexpr double kAny = std::numeric_limits<double>::infinity();
-  if (std::isfinite(w.bound.step) || w.def.max_work || w.prescribed.is_static()) return kAny;
-  const ContactStore &s = w.store;
-  double rate = 0;  // edges per second, toward each other
-  for (uint32_t m = 0; m < s.n; ++m) {
-    const uint32_t a = slot_of(w, s.id_a[m]), b = slot_of(w, s.id_b[m]), o = obstacle_slot_of(w, s.id_b[m]);
-    if (a == kNone || (b == kNone && o == kNone)) continue;
-    const Body &body = *w.bodies[a];
-    Vec3 by = speed_of(body, s.type_a[m], s.feature_a[m]);
-    double edge = body.surface.median_edge;
-    if (b == kNone) {
-      by -= speed_of(w, *w.obstacles[o], load3(&s.point[3 * size_t{m}]), dt);
-    } else {
-      by -= speed_of(*w.bodies[b], s.type_b[m], s.feature_b[m]);
-      edge = std::min(edge, w.bodies[b]->surface.median_edge);
-    }
-    if (edge > 0) rate = std::max(rate, -dot(by, load3(&s.normal[3 * size_t{m}])) / edge);
-  }
-  // more parts shorten the lists by little, and all bodies pay for each
-  return rate > 0 ? std::max(1 / rate, dt / kMostByContact) : kAny;
 }
 
 bool bound_expired(const World &w) { return w.bound.age >= kBoundEvery; }

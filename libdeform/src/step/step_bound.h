@@ -17,11 +17,6 @@ inline constexpr double kBoundStrain = 0.05;
 
 // Does any body step itself and name a bound for its contacts?
 bool any_bounds_contact(const World &w);
-// s, infinite: any. Where no bound divides a step: how long what was near in the last sub-step takes to come
-// nearer by the length of an edge, and no less than a sixteenth of the step. Contacts hold to first order,
-// and a sub-step lists all that lies on its way. Pairs of rigid things have rules of their own; a limit of
-// work would end the step before its end. dt: s, of the step
-double contact_step(const World &w, double dt);
 bool bound_expired(const World &w);  // does the next sub-step look whether it still holds?
 bool bound_is_new(const World &w);   // has it looked since the last sub-step?
 void expire_bound(World &w);         // the next one does
