@@ -44,7 +44,7 @@ Motion motion_of(const World &w, const ObstacleView &v) {
   return m;
 }
 
-// 1/s, how the reach grows with the length of a sub-step, over an edge, of two that meet within dt; otherwise 0.
+// 1/s: how many edges the reach grows by in a second, of two that meet within dt; otherwise 0.
 double rate(const Motion &a, const Motion &b, double offset, double dt) {
   Vec3 fastest;
   for (int k = 0; k < 3; ++k) {
