@@ -63,11 +63,17 @@ double contact_step(World &w, StepContext &step, double dt) {
   if (std::isfinite(w.bound.step)) return HUGE_VAL;
   step.rest = step.h = step.left = dt;
   view_obstacles(w, step);
+  const auto moves = [&](const ObstacleView &o) {
+    return o.shape == Shape::mesh &&
+           (is_moved(*w.obstacles[o.slot]) || norm2(o.velocity) + norm2(o.spin) > 0);
+  };
+  if (w.sleepers == w.bodies.size() && std::ranges::none_of(step.obstacle_views, moves)) return HUGE_VAL;
   step.spans.clear();
   for (const auto &b : w.bodies) step.spans.push_back(motion_of(*b));
   double most = 0;
   const auto meet = [&](const auto &a, const auto &b, const Motion &other) {
-    if (w.pairs.filter.may_touch(a, b)) most = std::max(most, rate(step.spans[a.slot], other, w.offset, dt));
+    const double needed = rate(step.spans[a.slot], other, w.offset, dt);
+    if (needed > most && w.pairs.filter.may_touch(a, b)) most = needed;
   };
   for (const BodyView &a : step.body_views)
     for (const BodyView &b : step.body_views)
