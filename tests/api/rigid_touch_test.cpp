@@ -286,6 +286,7 @@ TEST(RigidTouch, TwoBoxesThatMeet_KeepBothMomenta) {
 
 // Thrown about in a box of planes at up to 6 m/s: no corner is ever deep in a wall, and no energy comes from
 // nowhere.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(RigidTouch, Tumbling_StaysInside) {
   for (const double dt : kStep) {
     test::Context context;

@@ -579,6 +579,7 @@ TEST(Run, FramesByStress_ShowIt) {
 }
 
 // The block falls ever faster: the range of the first picture, too, is that of the last one.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Run, FramesByQuantity_HaveTheRangeOfTheWholeRun) {
   std::vector<std::string> drawn{"--time", "0.02", "--frames", "50", "--set", "/output/color=speed"};
   const Outcome film = run("film", drawn);

@@ -40,7 +40,7 @@ struct RudeHost {
   }
 };
 
-// unsanitized(implicit_msm_*:implicit_linear_*): slow; corotational_fem runs the same code
+// unsanitized(implicit_m*:implicit_l*:implicit_*_ball:implicit_*_ten:s*_ten:ten_*:condensed_*:fine_*): slow
 TEST_P(Determinism, OneToEightThreads_GiveTheSameHash) {
   scenes::Scene scene = GetParam();
   // eight runs, of the longest one until the ball has woken the block

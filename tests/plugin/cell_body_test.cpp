@@ -166,6 +166,7 @@ TEST_P(CellBody, Forces_AreTheGradientOfTheEnergyAndHaveNoMoment) {
 
 // At rest the tangent is the derivative, dampers too; away from it what is left out is of the order of the
 // strain, and no eigenvalue is positive.
+// unsanitized: too slow there; shorter tests run the same code
 TEST_P(CellBody, Tangent_IsTheDerivativeAtRestAndNegativeSemidefiniteElsewhere) {
   Host host;
   Body b(host, GetParam(), GetParam().mesh(), 0.3, 0.01, 0.5);
@@ -242,6 +243,7 @@ double field_error(uint32_t kind, uint32_t n) {
   return std::sqrt(sum / double(free.size() / 3)) / most;
 }
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(CellBars, ErrorOfASmoothField_FallsByTheOrderOfTheCells) {
   const double tet10 = field_error(DFM_CELL_TET10, 2) / field_error(DFM_CELL_TET10, 4);
   const double hex8 = field_error(DFM_CELL_HEX8, 3) / field_error(DFM_CELL_HEX8, 6);

@@ -394,6 +394,7 @@ TEST(PluginCheck, Template_KeepsEveryRuleInUnderSixtyLinesAndIsNotShipped) {
   EXPECT_FALSE(std::filesystem::exists(shipped("template_friction")));
 }
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(PluginCheck, TemplatesOfModels_KeepEveryRuleAndAreNotShipped) {
   for (const char *name : {"template_model", "template_model_cpp"}) {
     const test::CommandResult r = check(std::string(DEFORM_BINARY_DIR) + "/lib/template/" + name + ".so");
@@ -458,6 +459,7 @@ TEST(PluginCheck, OneRuleOfAFileThatDoesNotLoad_Fails) {
 }
 
 // "31 rules" and "31 [rules](..)" stand in the pages.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(PluginCheck, NumbersOfRules_AreThoseOfThePages) {
   std::set<std::string> counted;
   for (const char *plugin : {"friction_coulomb", "model_msm"}) {
