@@ -86,7 +86,7 @@ constexpr const char *kTeeth = "teeth of a cut or tear are as large as the cells
 
 }  // namespace
 
-// unsanitized: 36 s there; smaller tears have the same accesses
+// soak: 20 s; CutBodyThatCrossesItself has the sentence of teeth, PartsOfALiver that nothing overlaps
 // Nobody has put pieces in each other, and nothing of them can be moved: one sentence says what they are.
 TEST(TearScene, PiecesOfABallThatShatters_AreReportedOnceAndNotToBeMoved) {
   const test::CommandResult r =

@@ -261,6 +261,7 @@ TEST_P(GpuWorldState, OnASoftwareDriverAndOnTheProcessor_HasTheSameBits) {
   EXPECT_EQ(dfm_world_hash(a.world), dfm_world_hash(b.world));
 }
 
+// soak(relaxing): long; springs without branches make the same way
 TEST_P(GpuWorld, UnderASoftBall_CarriesBothWeights) {
   World w(GetParam(), device(), "coulomb", 0.5, {0, 0, -9.81}, 1e-4, 1e6);
   test::expect_block_carries_ball(w.context, w.world, w.body, 1.8);

@@ -363,8 +363,7 @@ TEST(PluginCheck, EveryShippedPlugin_KeepsEveryRule) {
   EXPECT_GE(models, 5);
 }
 
-// Each of their bodies solves for its modes, and rules make hundreds. Left out are the rules that make most of
-// them.
+// Each of their bodies solves for its modes. Left out are the rules that make most bodies.
 // unsanitized: minutes there; each plugin has tests of its own
 TEST(PluginCheck, ReducedModels_KeepTheRulesOfFewBodies) {
   std::vector<std::string> only;

@@ -48,6 +48,7 @@ TEST(TwoCylinders, CoarsePair_StaysWithFrictionAndFallsWithout) {
   EXPECT_LT(without.last("upper").com[2], 0.3);
 }
 
+// soak: long; scene_table_test has its landing, WithFriction and CoarsePair the rest
 TEST(TwoCylinders, FinePair_TouchesAtSixtyContactsAndMore) {
   const test::SceneRun run("two_cylinders_fine", {"--time", "1.2"});
   run.expect_valid(100, "fine pair");
