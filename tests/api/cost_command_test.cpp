@@ -305,6 +305,7 @@ TEST(Cost, Apply_WritesASceneThatMeetsTheTarget) {
 }
 
 // Whatever these meshes show: cost.json and --apply go by one verdict.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Cost, Apply_WritesWhatIsProvenAndNothingElse) {
   const std::string applied = test::scratch("cost_unproven") + "/applied.json";
   fs::remove(applied);
@@ -321,6 +322,7 @@ TEST(Cost, Apply_WritesWhatIsProvenAndNothingElse) {
 }
 
 // As the planner has made it, not planned anew beside each change; what is applied asks the planner no more.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Cost, SceneWithAnAccuracy_IsStudiedAsPlanned) {
   const std::string more = R"(, "accuracy": {"target": 0.2})";
   const Study s = study("planned", bar(R"("duration": 0.1)", "", more),
