@@ -64,13 +64,14 @@ def check(objdump, include, source, compiler, mode, folder):
 
 
 def header_only(include, compiler, folder):
-    """Two translation units with every member in each link into one library without a name defined twice."""
-    source = '#include <deform/deform.hpp>\n' + "".join(
+    """A unit with every member and one with the header link into one library without a name defined twice."""
+    header = "#include <deform/deform.hpp>\n"
+    members = "".join(
         f"template class deform::basic::{name}<deform::{mode}>;\n" for mode in ("Values", "Throw")
         for name in ("Context", "World", "Body", "Obstacle", "Rigid", "Material", "Law", "Scene", "Mesh"))
     paths = [pathlib.Path(folder) / f"unit{i}.cpp" for i in (1, 2)]
-    for path in paths:
-        path.write_text(source)
+    for path, text in zip(paths, (header + members, header)):
+        path.write_text(text)
     subprocess.run([compiler, "-std=c++20", "-shared", "-fPIC", f"-I{include}", *paths, "-o",
                     pathlib.Path(folder) / "units.so"], check=True)
 

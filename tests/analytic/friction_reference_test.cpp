@@ -126,6 +126,7 @@ class FrictionReference : public testing::TestWithParam<Case> {};
 
 }  // namespace
 
+// soak(stickslip_dahl:stickslip_lugre:stickslip_ep): long; Periods_AreRight has these at one step
 TEST_P(FrictionReference, Errors_StayWithinWhatIsStatedAndHalveWithTheStep) {
   const Case &c = GetParam();
   const std::string text = text_of(c);

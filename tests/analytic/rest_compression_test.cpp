@@ -19,6 +19,8 @@ TEST_P(Rest, BlockOnAPlaneAndOnABlock_AreCompressedAsTheStaticSolutionSays) {
           // TR-BDF2 rests by backward Euler
           if (integrator == DFM_INTEGRATOR_TR_BDF2 && (step < 1e-3 || scene == std::string("pair"))) continue;
           if (scene == std::string("pair") && step < 1e-3 && young < 1e5) continue;  // the costliest
+          // springs in every combination, finite elements with one modulus at each step
+          if (GetParam() != std::string("msm") && (step < 1e-3) != (young > 1e5)) continue;
           const Result r = run_case({scene, GetParam(), integrator, step, young});
           const std::string what = std::string(scene) + ", integrator " + std::to_string(integrator) +
                                    ", step " + std::to_string(step) + " s, E " + std::to_string(young) +

@@ -156,6 +156,7 @@ TEST(Budget, OfImplicitBodiesInAHeap_MakesNoEnergy) {
 }
 
 // Solves that would need more and ways that cross cost accuracy first, then sub-steps; no step takes more.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Budget, OfSolvesThatItEnds_IsKept) {
   test::Context c;
   for (const char *law : {"coulomb", "lugre"}) {

@@ -305,6 +305,7 @@ TEST(Cost, Apply_WritesASceneThatMeetsTheTarget) {
 }
 
 // Whatever these meshes show: cost.json and --apply go by one verdict.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Cost, Apply_WritesWhatIsProvenAndNothingElse) {
   const std::string applied = test::scratch("cost_unproven") + "/applied.json";
   fs::remove(applied);
@@ -321,6 +322,7 @@ TEST(Cost, Apply_WritesWhatIsProvenAndNothingElse) {
 }
 
 // As the planner has made it, not planned anew beside each change; what is applied asks the planner no more.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Cost, SceneWithAnAccuracy_IsStudiedAsPlanned) {
   const std::string more = R"(, "accuracy": {"target": 0.2})";
   const Study s = study("planned", bar(R"("duration": 0.1)", "", more),
@@ -348,6 +350,7 @@ TEST(Cost, SceneWithAnAccuracy_IsStudiedAsPlanned) {
 }
 
 // No error is relative to 0: the work of a pair without friction.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Cost, QuantityThatIsZero_IsLeftOutOrRefused) {
   const std::string block = R"(, "mesh": {"make": "beam", "size": [0.1, 0.1, 0.1], "cells": 60},
     "velocity": [0.5, 0, 0], "model": {"type": "corotational_fem"}, "material": "gel",
@@ -383,6 +386,7 @@ TEST(Cost, QuantityThatIsZero_IsLeftOutOrRefused) {
 }
 
 // A model of somebody else, whose dampers push instead of braking, is a choice like all that are loaded.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Cost, UnstableChoice_IsNamedAndNotChosen) {
   const std::string plugins = test::scratch("cost_plugins");
   fs::create_directories(plugins);
@@ -405,6 +409,7 @@ TEST(Cost, UnstableChoice_IsNamedAndNotChosen) {
   EXPECT_EQ(unstable, 1u);
 }
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Cost, Budget_EndsRunsThatWouldTakeHours) {
   const Study s = study("budget", bar(R"("duration": 1e5, "step": 0.001)"), {"--budget", "2"});
   EXPECT_EQ(s.result.exit_code, 2);
@@ -423,6 +428,7 @@ TEST(Cost, Budget_EndsRunsThatWouldTakeHours) {
 }
 
 // Long implicit steps stop a ball dead on the floor; against one of them a scene that does so looks exact.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Cost, SceneThatBounces_IsComparedWithARunThatBounces) {
   const Study s = study("bounce", R"({"format": "deform-scene", "version": 1,
     "time": {"duration": 0.25, "step": 0.002, "integrator": "implicit_euler"},
@@ -449,6 +455,7 @@ TEST(Cost, SceneThatBounces_IsComparedWithARunThatBounces) {
 }
 
 // Without probes the study follows two points of each body, which it finds at rest, not where the bodies are.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Cost, SceneThatBeginsMovedAway_IsStudied) {
   const std::string folder = test::scratch("cost_moved"), scene = folder + "/scene.json";
   test::write_file(scene, R"({"format": "deform-scene", "version": 1,

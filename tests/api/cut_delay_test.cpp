@@ -220,8 +220,8 @@ TEST(CutDelay, Blade_PaysForTheCut) {
 TEST(CutDelay, OnOneTwoOrFourThreads_TheBitsAreTheSame_InTimeOrLate) {
   const auto run = [](uint32_t threads, bool hurry) {
     Cube s({.delay = 0.006, .threads = threads, .floor = true, .energy = 100});
-    for (int i = 0; i < 70; ++i) {
-      s.step(i < 60 ? 1 : 0);
+    for (int i = 0; i < 45; ++i) {
+      s.step(i < 35 ? 1 : 0);
       // most cuts are made by the time that they are needed, or only just begun
       if (!hurry && s.waiting() > 0) std::this_thread::sleep_for(std::chrono::milliseconds(4));
     }

@@ -94,6 +94,7 @@ class Entry:
 
 // Within the bands the cheaper is better, outside them the nearer; a trial that fails is the worst. A row for
 // every trial, none run twice; the best runs as a configuration of its own.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(FrictionBenchmark, Search_FindsTheBestSettingsWhichRunThen) {
   const std::string folder = test::scratch("friction_benchmark_search");
   test::write_file(folder + "/entry_tunable.py", R"(class Entry:

@@ -296,6 +296,7 @@ TEST(FrictionCommand, PlotWithoutMatplotlib_KeepsTheRows) {
   EXPECT_TRUE(std::filesystem::exists(csv) && !std::filesystem::exists(beside));
 }
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(FrictionCommand, Plot_WritesAPictureAndNothingElse) {
   const std::string picture = folder() + "/drawn.png";
   std::filesystem::remove(picture);

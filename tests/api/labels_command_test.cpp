@@ -189,6 +189,7 @@ TEST(LabelsCommand, SceneThatTheUserHasChanged_IsNotReplaced) {
   EXPECT_EQ(test::read_file(scene), changed);
 }
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(LabelsCommand, ManyTriangles_AreReportedAndTheCommandCanBePasted) {
   const std::string out = folder() + "/a folder's name";
   const auto fine =
@@ -226,6 +227,7 @@ TEST(LabelsCommand, WithATable_MakesBodiesAnObstacleAndWhatHoldsThem) {
   EXPECT_EQ(number(test::read_file(out + "/run/summary.json"), "inverted_max"), 0);
 }
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(LabelsCommand, BodiesThatAreCut_HaveCellsThatFollowTheirLabels) {
   const std::string table = folder() + "/cut_table.json", out = folder() + "/cut organs";
   std::filesystem::remove_all(out);

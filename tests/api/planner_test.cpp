@@ -376,6 +376,7 @@ TEST_F(PlannerScene, Loads_CountAtTheirGreatest) {
 }
 
 // Held is what is held along all axes, and met is what is there and no sensor and not filtered.
+// unsanitized: too slow there; shorter tests run the same code
 TEST_F(PlannerScene, HoldsAndObstacles_CountAsTheyAre) {
   const std::string scene = bar(R"("accuracy": {"target": 0.4},)", R"("lattice": null, )");
   const auto about = [&](const std::vector<std::string> &set) { return assumed_of(scene, set); };

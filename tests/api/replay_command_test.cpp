@@ -83,6 +83,7 @@ TEST(Replay, StateThatIsNotTheRecordedOne_IsReportedWithItsTimeAndExitsWith1) {
   EXPECT_NE(test::read_file(out + "/replay/summary.json").find("\"simulated_s\": 0.04"), std::string::npos);
 }
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Replay, WhatDoesNotFit_IsReportedAndNothingIsLost) {
   const Folder f;
   const std::string state = f.path + "/mid.state", out = f.path + "/run";

@@ -350,6 +350,7 @@ TEST(RigidJoints, ADoorInItsPost_Opens) {
 
 // An arm that a motor turns until it meets a stop: a snapshot knows the motor, whatever it has become since,
 // and so does a world made anew.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(RigidJoints, Motors_ComeBackWithASnapshot) {
   struct Arm {
     test::Context context;

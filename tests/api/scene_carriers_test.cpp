@@ -334,6 +334,7 @@ TEST(SceneFill, ClosedSurface_BecomesABodyOfItsVolume) {
 }
 
 // What a mesh has as cells, in a file or as it is made, goes where others are asked for.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(SceneFill, MeshWithCells_KeepsItsShapeUnderOthers) {
   constexpr const char *kModel = "/bodies/0/model={\"type\": \"linear_fem\"}",
                        *kLattice = "/bodies/0/lattice={\"size\": 0.1}",

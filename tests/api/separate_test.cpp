@@ -85,6 +85,7 @@ TEST(Separate, Pieces_KeepMassBothMomentaAndEnergy) {
 
 // A cube on the floor is cut level and its halves become two bodies. They rest on each other along faces
 // that lie on each other at rest.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Separate, UpperPart_RestsOnTheLowerOne) {
   for (const char *model : kModels) {
     const CubeOnFloor scene(model, 5e4);
@@ -122,6 +123,7 @@ TEST(Separate, UpperPart_RestsOnTheLowerOne) {
 
 // A slit body falls on triangles, whose number among the things of the world was its own until another body
 // was removed: they are no part of it.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Separate, ACutBodyOverTriangles_StaysWholeWhenAnotherIsRemoved) {
   Cube s("msm", {0, 0, -9.81});
   test::add_mesh(s.w, "floor", test::height_field(2, 80, [](double x, double y) {

@@ -134,7 +134,7 @@ TEST(SpinCut, CutsThemselves_KeepAngularMomentumToRounding) {
 TEST(SpinCut, ToolWithAnEdge_PartsACubeThatTurns) {
   int kept = 0;
   for (const char *model : kModels)
-    for (const uint64_t seed : {5, 6, 7, 8}) {
+    for (const uint64_t seed : {5, 6}) {
       Random random(seed);
       for (int run = 0; run < 10; ++run) {
         Spin s(model, 2e4, random.direction(3 + random(1.5)), run % 2 ? 320 : 60);
@@ -157,5 +157,5 @@ TEST(SpinCut, ToolWithAnEdge_PartsACubeThatTurns) {
         kept += books.check(s.b, run);
       }
     }
-  EXPECT_GE(kept, 73) << "of 80";
+  EXPECT_GE(kept, 37) << "of 40";
 }

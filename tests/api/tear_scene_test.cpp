@@ -24,6 +24,7 @@ double fall(const char *limit) {
 
 }  // namespace
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(TearScene, BarBetweenJaws_FallsWhereItTearsAndHangsWhereItDoesNot) {
   EXPECT_GT(fall("0.35"), 0.08) << "on the table";
   EXPECT_LT(fall("10"), 0.05) << "between the jaws";
@@ -85,7 +86,7 @@ constexpr const char *kTeeth = "teeth of a cut or tear are as large as the cells
 
 }  // namespace
 
-// unsanitized: 36 s there; smaller tears have the same accesses
+// soak: 20 s; CutBodyThatCrossesItself has the sentence of teeth, PartsOfALiver that nothing overlaps
 // Nobody has put pieces in each other, and nothing of them can be moved: one sentence says what they are.
 TEST(TearScene, PiecesOfABallThatShatters_AreReportedOnceAndNotToBeMoved) {
   const test::CommandResult r =

@@ -668,6 +668,7 @@ TEST(ToolCutScene, WhatIsWrong_IsNamed) {
 }
 
 // Recorded and replayed, and continued from a saved state in the middle of the cut: the same bits.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(ToolCutScene, RunThatCuts_IsReplayedAndContinuedToTheBit) {
   const std::string dir = folder(), path = dir + "/a scene.json";
   test::write_file(path, scene(R"({"bodies": ["cube"], "most": 12})"));

@@ -152,6 +152,7 @@ TEST(ToolLift, ByEveryLaw_NothingCreeps) {
 
 // A held needle, whose moments differ 50 times, is turned and tilted and carried about, and a snapshot in the
 // middle of it continues with the same bits.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(ToolLift, ANeedleThatIsTurned_StaysInTheJaws) {
   for (const double dt : {1e-3, 1.0 / 120}) {
     SCOPED_TRACE(dt);

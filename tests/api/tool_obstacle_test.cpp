@@ -136,6 +136,7 @@ TEST(ToolObstacle, PressedDown_EachShapeStopsOnEachFloor) {
 
 // A device that jitters throws an undamped tool at a plane and at triangles, with friction: what the tool and
 // its spring have, less what the hand has put in, never rises by more than rounding.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(ToolObstacle, AJitteringDevice_MakesNoEnergy) {
   for (const char *const floor : {"plane", "mesh", "sheet"})
     for (const Shape &shape : kShapes)

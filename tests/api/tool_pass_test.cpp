@@ -91,6 +91,7 @@ TEST(ToolPass, TwoDrivenTools_PassWithOneSentence) {
 
 // A blade without a coupling presses a soft cube flat on a floor, in 50 ms. It does not yield, so in the end
 // no state holds cube, floor and blade apart.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(ToolPass, SoftCubePressedFlatByADrivenTool_StopsAndSaysWhy) {
   test::Context context;
   const dfm_world w = test::make_world(context, {0, 0, 0});

@@ -184,6 +184,7 @@ TEST(ToolPassive, AJitteringDevice_GetsNoEnergy) {
 
 // 10 ms late, a soft coupling is as quiet. A hard one drives the hand, without bound or, with the controller,
 // by tenths of a joule.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(ToolPassive, ALateDevice_IsQuietWhereSoft_AndHeldBackWhereHard) {
   Scene soft(2e6, 300, 1.0, DFM_TOOL_PASSIVE, 0.01);
   const Pressed quiet = press(soft, 2, 10);

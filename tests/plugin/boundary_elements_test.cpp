@@ -232,7 +232,7 @@ TEST(Boundary, RigidMotionOfWhatIsHeld_IsFollowedWithoutForce) {
 }
 
 // To what two passes with a factor of thin tiles leave.
-// unsanitized: too slow there; shorter tests run the same code
+// soak: long; RigidMotionOfWhatIsHeld asks the same of a short one
 TEST(Boundary, RigidMotionOfALongBar_IsFollowedWithoutForce) {
   move_what_is_held(kuhn_bar(32, 3, 3, 0.05), 1e-6);
 }
@@ -393,7 +393,7 @@ double force_of_pressed_cube(const char *model, const char *mesh, uint32_t cells
 }
 
 // With free sides it would be 20 N at any Poisson's ratio.
-// unsanitized: too slow there; shorter tests run the same code
+// soak: long; BallPressedBetweenPlanes has the closed form
 TEST(Boundary, CubePressedBetweenPlanes_AnswersWithTheForceOfFiniteElements) {
   for (const double poisson : {0.3, 0.45}) {
     const double force = force_of_pressed_cube("boundary", "beam", 3000, poisson);

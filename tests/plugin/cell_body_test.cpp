@@ -166,6 +166,7 @@ TEST_P(CellBody, Forces_AreTheGradientOfTheEnergyAndHaveNoMoment) {
 
 // At rest the tangent is the derivative, dampers too; away from it what is left out is of the order of the
 // strain, and no eigenvalue is positive.
+// unsanitized: too slow there; shorter tests run the same code
 TEST_P(CellBody, Tangent_IsTheDerivativeAtRestAndNegativeSemidefiniteElsewhere) {
   Host host;
   Body b(host, GetParam(), GetParam().mesh(), 0.3, 0.01, 0.5);
@@ -183,6 +184,7 @@ TEST_P(CellBody, Tangent_IsTheDerivativeAtRestAndNegativeSemidefiniteElsewhere) 
 }
 
 // No eigenvalue of h^2 K + 2 h C over M is above 4 at the bound, at rest and well away from it.
+// unsanitized: too slow there; shorter tests run the same code
 TEST_P(CellBody, Bound_IsAboveTheLargestEigenvalue) {
   for (double amount : {0.0, 4e-3, 1.5e-2}) {
     Host host;
@@ -242,6 +244,7 @@ double field_error(uint32_t kind, uint32_t n) {
   return std::sqrt(sum / double(free.size() / 3)) / most;
 }
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(CellBars, ErrorOfASmoothField_FallsByTheOrderOfTheCells) {
   const double tet10 = field_error(DFM_CELL_TET10, 2) / field_error(DFM_CELL_TET10, 4);
   const double hex8 = field_error(DFM_CELL_HEX8, 3) / field_error(DFM_CELL_HEX8, 6);

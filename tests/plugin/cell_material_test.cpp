@@ -137,6 +137,7 @@ TEST(CellMaterial, Forces_AreTheGradientOfThePotentialAndHaveNoMoment) {
 }
 
 // Small strain, where what the tangent leaves out is small.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(CellMaterial, Tangent_IsThatOfTheFlowAndOfFibers) {
   for (const Case &kind : meshes()) {
     for (Params p : flows()) {
@@ -163,6 +164,7 @@ TEST(CellMaterial, Tangent_IsThatOfTheFlowAndOfFibers) {
   }
 }
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(CellMaterial, Bound_IsAboveTheLargestEigenvalue) {
   for (const Case &kind : meshes())
     for (const Params &p : {soft({{"damping_stiffness", {1e-4}}}), fibers()})

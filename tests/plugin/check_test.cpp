@@ -352,14 +352,33 @@ TEST(BrokenLaw, ThatWaitsForEver_IsEndedWhileResultsArePrintedAsTheyCome) {
 TEST(PluginCheck, EveryShippedPlugin_KeepsEveryRule) {
   int laws = 0, models = 0;
   for (const auto &entry : std::filesystem::directory_iterator(DEFORM_PLUGIN_DIR)) {
-    if (entry.path().stem() == "model_gpu") continue;  // needs a driver: tests/gpu
+    if (entry.path().stem() == "model_gpu") continue;      // needs a driver: tests/gpu
+    if (entry.path().stem() == "model_reduced") continue;  // below
     const test::CommandResult r = check(entry.path().string(), {}, kPatient);
     EXPECT_EQ(r.exit_code, 0) << r.out << r.err;
     laws += r.out.find("\nlaw ") != std::string::npos;
     for (size_t at = 0; (at = r.out.find("\nmodel ", at)) != std::string::npos; ++at) ++models;
   }
   EXPECT_GE(laws, 3);
-  EXPECT_GE(models, 7);
+  EXPECT_GE(models, 5);
+}
+
+// Each of their bodies solves for its modes. Left out are the rules that make most bodies.
+// unsanitized: minutes there; each plugin has tests of its own
+TEST(PluginCheck, ReducedModels_KeepTheRulesOfFewBodies) {
+  std::vector<std::string> only;
+  for (const char *rule :
+       {"V03", "V04", "V05", "V09", "V11", "V12", "V14", "M01", "M03", "M14", "M17", "M18", "M19"})
+    only.insert(only.end(), {"--only", rule});
+  const test::CommandResult r = check(shipped("model_reduced"), only, kPatient);
+  EXPECT_EQ(r.exit_code, 0) << r.out << r.err;
+  EXPECT_EQ(rules_that("pass", r.out).size(), 2 + 3 * 11u) << r.out;
+}
+
+// soak: a minute, and the other rules are those of ReducedModels_KeepTheRulesOfFewBodies
+TEST(PluginCheck, ReducedModels_KeepEveryRule) {
+  const test::CommandResult r = check(shipped("model_reduced"), {}, kPatient);
+  EXPECT_EQ(r.exit_code, 0) << r.out << r.err;
 }
 
 // What strangers copy is checked like what is shipped, and is no part of it.
@@ -374,6 +393,7 @@ TEST(PluginCheck, Template_KeepsEveryRuleInUnderSixtyLinesAndIsNotShipped) {
   EXPECT_FALSE(std::filesystem::exists(shipped("template_friction")));
 }
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(PluginCheck, TemplatesOfModels_KeepEveryRuleAndAreNotShipped) {
   for (const char *name : {"template_model", "template_model_cpp"}) {
     const test::CommandResult r = check(std::string(DEFORM_BINARY_DIR) + "/lib/template/" + name + ".so");
@@ -438,6 +458,7 @@ TEST(PluginCheck, OneRuleOfAFileThatDoesNotLoad_Fails) {
 }
 
 // "31 rules" and "31 [rules](..)" stand in the pages.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(PluginCheck, NumbersOfRules_AreThoseOfThePages) {
   std::set<std::string> counted;
   for (const char *plugin : {"friction_coulomb", "model_msm"}) {

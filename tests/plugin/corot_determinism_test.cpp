@@ -63,6 +63,7 @@ const std::vector<Params> &all_kinds() {
   return all;
 }
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(CorotDeterminism, InstructionSet_NeverShowsInAResult) {
   for (const Mesh &mesh : {irregular_tet(), kuhn_bar(4, 3, 2, 0.1, 0.2), large_bar()})
     for (const Params &p : all_kinds()) {

@@ -139,7 +139,7 @@ TEST_F(Karnopp, StickSlipPeriod_IsThatOfTheReference) {
   Rig rig;
   std::vector<double> starts;
   double resting = 0;
-  for (int i = 0; i * h < 45; ++i) {
+  for (int i = 0; i * h < 45 && starts.size() < 5; ++i) {
     rig.step(*ops, p, h, k * (pull * i * h - rig.x), 1);
     resting = rig.v == 0 ? resting + h : 0;
     if (rig.v == 0 && resting < 1.5 * h) starts.push_back(i * h);

@@ -205,7 +205,7 @@ TEST(MsmBars, FreeMesh_IsOneMaterialInEveryDirection) {
 
 // Printed for doc/models/msm.md; linear tetrahedra sag -78, -49, -21, -6 % of the slender beam on s1..s4.
 // Finer is softer.
-// unsanitized: too slow there; shorter tests run the same code
+// soak: a convergence series; HangingBar has the same meshes
 TEST(MsmBars, Cantilever_SagGrowsTowardsTheBeamUnderRefinement) {
   for (char letter : {'s', 'u'}) {
     double last = 0;

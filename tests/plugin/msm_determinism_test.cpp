@@ -66,6 +66,7 @@ Params tilted(double damping, bool form_a) {
   return p;
 }
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(MsmDeterminism, InstructionSetAndCut_NeverShowInAnyOption) {
   Fields uneven;
   for (uint32_t c = 0; c < large_bar().ncell(); ++c) {

@@ -45,6 +45,7 @@ Params collapsing() {
 // 5 units of the 24th bit.
 double bound_of(const Params &p, double h) { return 30 * kUnit * p.young * h * h; }
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(MsmSingle, Error_IsAFewUnitsOfTheLastBitOfAStrain) {
   const double h = 0.1;
   for (const Params &p : {Params{2e5}, Params{2e5, 0.4, 0.003}, kFull, tilted(), collapsing()})
@@ -128,6 +129,7 @@ std::vector<double> results(const char *simd, const Mesh &mesh, const Params &p,
   return all;
 }
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(MsmSingle, InstructionSetAndCut_NeverShowInAResult) {
   Params undamped = kFull;
   undamped.damping_stiffness = 0;

@@ -15,7 +15,12 @@ SCENES = pathlib.Path(os.environ["DEFORM_SOURCE"]) / "examples" / "scenes"
 class Command(unittest.TestCase):
     def test_cost_gives_a_table(self):
         with tempfile.TemporaryDirectory(suffix=" with space") as folder:
-            table = deform.cost(SCENES / "slope_block.json", budget=40, axes=["time"], out=folder)
+            scene = json.loads((SCENES / "slope_block.json").read_text())
+            scene["time"]["duration"] = 1.0
+            scene["bodies"][0]["mesh"] = str(SCENES.parent / "data" / "block.msh")
+            short = pathlib.Path(folder) / "short.json"
+            short.write_text(json.dumps(scene))
+            table = deform.cost(short, budget=40, axes=["time"], out=folder)
             self.assertEqual(json.loads((pathlib.Path(folder) / "cost.json").read_text()), table.report)
         self.assertIn("integrator", table.columns)
         self.assertEqual(len(table.column("error")), len(table))

@@ -1,4 +1,5 @@
 """Sweeps: designs, results that stay whatever ends a run, a worker or the sweep, tables, plots, exports."""
+import contextlib
 import csv
 import importlib.util
 import io
@@ -70,6 +71,15 @@ class InAFolder(unittest.TestCase):
                               cwd=self.folder, env={**os.environ, **environment})
         self.assertEqual(done.returncode, code, done.stderr + done.stdout)
         return done
+
+    def here(self, *arguments, code=0):
+        """The same in this process, which has imported what draws."""
+        out, err = io.StringIO(), io.StringIO()
+        with (unittest.mock.patch("signal.signal"), contextlib.redirect_stdout(out),
+              contextlib.redirect_stderr(err),
+              unittest.mock.patch.object(sys, "argv", ["deform", *map(str, arguments)])):
+            self.assertEqual(command_line.main(), code, err.getvalue() + out.getvalue())
+        return subprocess.CompletedProcess(arguments, code, out.getvalue(), err.getvalue())
 
     def study(self, **changes):
         path = self.folder / "study.json"
@@ -455,27 +465,29 @@ class Outputs(InAFolder):
 
     def test_files_of_others_stay_as_they_are(self):
         study = self.study(design={"method": "random", "runs": 1})
-        for name, options in (("sweep.csv", ()), ("sweep.html", ()), ("curves.png", ()), ("runs.jsonl", ()),
-                              ("runs/0-9.jsonl", ()), ("runs/0-0.jsonl", ("--only", "0")),
-                              ("Snakefile", ("--export", "snakemake")), ("array.sh", ("--export", "slurm"))):
-            foreign = self.out / name
-            foreign.parent.mkdir(parents=True, exist_ok=True)
-            foreign.write_text('{"mine": 1}\n{"mine": 2}')
-            said = self.command("sweep", study, "--out", self.out, *options, code=2).stderr
-            self.assertIn(f"{foreign}: another program wrote this file", said)
-            self.assertEqual(foreign.read_text(), '{"mine": 1}\n{"mine": 2}')
-            foreign.unlink()
+        for names, options in (
+                (("sweep.csv", "sweep.html", "curves.png", "runs.jsonl", "runs/0-9.jsonl"), ()),
+                (("runs/0-0.jsonl",), ("--only", "0")), (("Snakefile",), ("--export", "snakemake")),
+                (("array.sh",), ("--export", "slurm"))):
+            for name in names:
+                foreign = self.out / name
+                foreign.parent.mkdir(parents=True, exist_ok=True)
+                foreign.write_text('{"mine": 1}\n{"mine": 2}')
+                said = self.here("sweep", study, "--out", self.out, *options, code=2).stderr
+                self.assertIn(f"{foreign}: another program wrote this file", said)
+                self.assertEqual(foreign.read_text(), '{"mine": 1}\n{"mine": 2}')
+                foreign.unlink()
             for _ in range(2):  # its own it replaces
-                self.command("sweep", study, "--out", self.out, *options)
+                self.here("sweep", study, "--out", self.out, *options)
 
     def test_parquet_of_others_stays_as_it_is(self):
         study = self.study(design={"method": "random", "runs": 1})
         foreign = self.out / "sweep.parquet"
         foreign.parent.mkdir(parents=True, exist_ok=True)
         foreign.write_bytes(b"PAR1 mine PAR1")
-        said = self.command("sweep", study, "--out", self.out, "--parquet", code=2).stderr
+        said = self.here("sweep", study, "--out", self.out, "--parquet", code=2).stderr
         self.assertIn(f"{foreign}: another program wrote this file", said)
-        self.command("sweep", study, "--out", self.out)  # does not write it
+        self.here("sweep", study, "--out", self.out)  # does not write it
         self.assertEqual(foreign.read_bytes(), b"PAR1 mine PAR1")
         foreign.write_bytes(b"PAR1" + bytes(3 << 20) + b"deform sweep" + bytes(100))
         refuse_foreign(foreign, "deform sweep")
@@ -516,7 +528,7 @@ class Outputs(InAFolder):
         self.assertNotIn("http", page)
         for name in "curves", "map", "parallel":
             self.assertEqual((self.out / f"{name}.png").read_bytes()[1:4], b"PNG")
-        self.command("sweep", self.study(design={"method": "random", "runs": 1}), "--out", self.out)
+        self.here("sweep", self.study(design={"method": "random", "runs": 1}), "--out", self.out)
         self.assertEqual(sorted(path.name for path in self.out.iterdir()),
                          ["runs.jsonl", "sweep.csv", "sweep.html"])
 
@@ -545,13 +557,13 @@ class Outputs(InAFolder):
         self.assertIn("#SBATCH --array=0-9", array.read_text())
         for ignored in (["--only", "3", "--parquet"], ["--export", "slurm", "--retry"],
                         ["--export", "slurm", "--workers", "2"]):
-            said = self.command("sweep", study, "--out", self.out, *ignored, code=2)
+            said = self.here("sweep", study, "--out", self.out, *ignored, code=2)
             self.assertIn("omit one of the two", said.stderr)
         wide = self.folder / "my study.json"
         shutil.copy(study, wide)
-        self.command("sweep", wide, "--out", self.folder / "wide", "--export", "slurm")
+        self.here("sweep", wide, "--out", self.folder / "wide", "--export", "slurm")
         self.assertIn("#SBATCH --job-name='my study'\n", (self.folder / "wide" / "array.sh").read_text())
-        self.command("sweep", study, "--out", self.out, "--export", "snakemake")
+        self.here("sweep", study, "--out", self.out, "--export", "snakemake")
         flow = (self.out / "Snakefile").read_text()
         compile(flow.split("rule")[0], "Snakefile", "exec")
         self.assertIn(f"    input: ['{study}', '{self.scene}']", flow)
@@ -559,7 +571,7 @@ class Outputs(InAFolder):
             done = subprocess.run(["sh", array], env={**os.environ, "SLURM_ARRAY_TASK_ID": str(i)},
                                   cwd="/", capture_output=True, text=True)
             self.assertEqual(done.returncode, 0, done.stderr)
-        said = self.command("sweep", study, "--out", self.out, code=1)
+        said = self.here("sweep", study, "--out", self.out, code=1)
         self.assertIn(" of 6 runs, 0 failed", said.stderr)
         self.assertIn("9 done, 1 failed", said.stdout)
 

@@ -19,7 +19,7 @@ TEST(CoverRows, EveryPairOfLevels_IsInOne) {
   EXPECT_FALSE(pairs.first(row));
 }
 
-// soak(linear_fem_thesis_self_*:shape_matching_mls_self_*): long
+// soak(l*thesis_self*:s*mls_self*:*soft_condensed*implicit*:msm_mls_soft_s*:me*mls_soft_c*:me*bary*): long
 TEST_P(Cover, Row_Holds) {
   const Row row = GetParam();
   const Seen seen = run(row);

@@ -285,9 +285,6 @@ TEST(CutPieces, SidesOfASlitThatCrossed_SeldomStayCrossed) {
 // Splinters that leave each other no way ended the run at 0.995 s ("squeezed until nothing can move"), though
 // nothing closes on them. They come off with two pairs of triangles in each other.
 TEST(CutPieces, SplintersThatJam_EndNoRun) {
-  for (const std::string young : {"1e5", "1.0001e5", "1.0002e5"}) {
-    const std::string dough = R"({"density": 1000, "tear": 0.5, "young": )" + young + "}";
-    EXPECT_LE(crossings("torn_jam", pulled_bar(R"({"duration": 1, "step": 0.001})", dough.c_str(), 1000)),
-              2u);
-  }
+  const char *const dough = R"({"density": 1000, "tear": 0.5, "young": 1e5})";
+  EXPECT_LE(crossings("torn_jam", pulled_bar(R"({"duration": 1, "step": 0.001})", dough, 1000)), 2u);
 }

@@ -30,6 +30,7 @@ TEST(GravityBeams, ModuliSwapped_LosesTheOrder) {
       "gravity_beams", {"--set", "/materials/soft/young=2e6", "--set", "/materials/stiff/young=5e5"})));
 }
 
+// soak: long, and a jittered run of what another test runs
 TEST(GravityBeams, JitteredRuns_KeepTheOrder) {
   test::expect_jittered("gravity_beams", 1, 10, {}, 0, ordered);
 }

@@ -28,20 +28,24 @@ void expect_at_rest(const Case &c) {
 
 }  // namespace
 
+// soak(karnopp:elastoplastic): the sets of coulomb and the bristles of lugre; cover_test has each law
 TEST_P(Hold, OnASlopeAndPulled_DoesNotCreep) {
   for (const double level : {0.5, 0.9, 0.99}) expect_held({"slope", GetParam(), level, 1e-3, false});
   expect_held({"pull", GetParam(), 0.99, 1.0 / 60, false});
 }
 
+// soak(karnopp:elastoplastic): as above
 TEST_P(Hold, CapsuleGrippedByLittleMoreThanItNeeds_DoesNotCreep) {
   expect_held({"pinch", GetParam(), 1.05, 1e-3, false});
 }
 
+// soak(karnopp:elastoplastic): as above
 TEST_P(Hold, CapsuleGrippedHard_DoesNotCreep) { expect_held({"pinch", GetParam(), 95, 1.0 / 240, false}); }
 
 // Two soft bodies whose meshes have nothing in common. On them nearly redundant contacts share the load, so
 // that what the solve leaves shows as noise of the normal forces and velocities, and edges are pressed flat:
 // a law with memory turns both into creep, 2e-4 to 6e-4 m/s before they were cured.
+// soak(karnopp:elastoplastic): as above
 TEST_P(Hold, PulledOnASoftBed_DoesNotCreep) {
   expect_held({"soft", GetParam(), 0.5, 1e-3, false});
   // gms: its page, limits
@@ -51,6 +55,7 @@ TEST_P(Hold, PulledOnASoftBed_DoesNotCreep) {
 // Of nearly redundant contacts some carry nothing, and which is chance. While the areas of their neighbors
 // went by that, each turn took force off the patch and shook the stack, which took the next turn: the top
 // cube walked by 2e-6 to 5e-6 m/s without an end (doc/decisions/friction_memory.md).
+// soak(karnopp:elastoplastic): as above
 TEST_P(Hold, StackOfThreeCubes_ComesToRest) { expect_at_rest({"stack", GetParam(), 3, 1e-3, false}); }
 
 TEST_P(Hold, BlockInAGroove_Rests) {
@@ -71,7 +76,7 @@ TEST_P(Hold, PulledBackAndForth_DriftsByTheLawsFormulaOrNotAtAll) {
 }
 
 // Implicit bodies at the step of a frame and at 1 ms.
-// soak(dahl:lugre:elastoplastic:gms): long; cover_test has each law with each integrator
+// soak(karnopp:dahl:lugre:elastoplastic:gms): long; cover_test has each law with each integrator
 TEST_P(Hold, ImplicitBodies_DoNotCreep) {
   const auto held_body = [](const char *scene, double level, double step, const char *model) {
     const Result r =

@@ -91,6 +91,7 @@ bool tipped(const SceneRun &run) {
 
 }  // namespace
 
+// soak(bullet_double): bullet_float and ode make the same way through the library
 TEST_P(EngineScenes, Box_RestsOnItsBedAsWithTheBuiltinHost) {
   expect_as_builtin(GetParam(), "ode_bed", {}, {"bed", "box"}, 0.16);
 }
@@ -100,11 +101,13 @@ TEST(OdeBed, JitteredRuns_AllLand) {
   EXPECT_FALSE(landed(SceneRun("ode_bed", lasting(1.3, {"/rigid/bodies/0/velocity=[2,0,0]"}))));
 }
 
+// soak(bullet_double): as above
 TEST_P(EngineScenes, GrippedBall_IsWhereTheBuiltinHostHasIt) {
   expect_as_builtin(GetParam(), "ode_gripper", lifting(), {"ball", "left", "right"}, 0.1);
 }
 // What ODE's joints and motors hold is as still as what the builtin host's hold: motion of the ball against a
 // finger over the last of four seconds.
+// soak(bullet_double): as above
 TEST_P(EngineScenes, LiftedBall_DoesNotSlip) {
   for (const char *step : {"0.001", "0.00416666666666667"}) {
     const SceneRun run("ode_gripper", lasting(4, {"/rigid/bodies/0/joints/0/motor/velocity=0.05",
@@ -127,6 +130,7 @@ TEST(OdeGripper, JitteredRuns_AllLift) {
                                                        "/rigid/bodies/2/joints/0/motor/max=12"}))));
 }
 
+// soak(bullet_double): as above
 TEST_P(EngineScenes, BrakedCart_RestsOnItsTiresAsWithTheBuiltinHost) {
   const std::vector<std::string> brakes = {"/rigid/bodies/3/joints/0/motor/velocity=0",
                                            "/rigid/bodies/4/joints/0/motor/velocity=0"};
@@ -151,6 +155,7 @@ TEST(OdeCart, WithoutGripOrBump_DoesNotDriveUpIt) {
       "ode_cart", lasting(0.5, {R"(/contact/filter=[{"between": ["*", "bump"], "collide": false}])"}))));
 }
 
+// soak(bullet_double): as above
 TEST_P(EngineScenes, Ring_IsDraggedWhereTheBuiltinHostDragsIt) {
   expect_as_builtin(GetParam(), "ode_chain", {}, {"bag", "link2", "peg"}, 0.15);
 }
@@ -178,6 +183,7 @@ TEST(OdeChain, Joints_ConvergeWithTheStep) {
   }
 }
 
+// soak(bullet_double): as above
 TEST_P(EngineScenes, WeightsOfTheSeesaw_RestAsWithTheBuiltinHost) {
   expect_as_builtin(GetParam(), "ode_seesaw", {}, {"light", "heavy", "pad", "plank"}, 0.1);
 }

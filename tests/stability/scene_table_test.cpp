@@ -118,6 +118,7 @@ TEST(SceneTable, EveryContactScene_IsRunTenTimesWithJitter) {
 class ContactScene : public testing::TestWithParam<Row> {};
 
 // The same short run with and without contact: the first is sound, the second must not be.
+// soak(basin:fill_drop*:liver:orange): long; the other scenes are judged alike
 TEST_P(ContactScene, WithoutContact_MissesItsCriteria) {
   const Row &row = GetParam();
   if (row.needs_ode && !test::kHasOde) GTEST_SKIP() << "built without libdeform_ode";

@@ -40,6 +40,7 @@ TEST(Terrain, ThatLetsThrough_IsCrossed) {
   EXPECT_FALSE(in_the_dale(run));
 }
 
+// soak: long, and a jittered run of what another test runs
 TEST(Terrain, JitteredRuns_DoNotCross) { test::expect_jittered("terrain", 1, 10, kShort, 12, in_the_dale); }
 
 TEST(Basin, BodiesDropped_LieInTheVoxels) {

@@ -20,6 +20,7 @@ bool apart(const test::SceneRun &run) { return run.number("intersections_max") =
 
 }  // namespace
 
+// soak: long; FillDrop.OrgansAndRabbits has the same criteria, and the landing is in scene_table_test
 TEST(TenBodies, DroppedInABox_ComeToRestWithoutCrossing) {
   // When the last bar has fallen over differs by a second between starts that differ by rounding.
   const test::SceneRun run("ten_bodies", {"--time", "5"});

@@ -38,6 +38,7 @@ TEST(TwoCylinders, JitteredRuns_AllStay) {
 }
 
 // The pair of the speed figures, on meshes of fair to poor cells.
+// soak: long; scene_table_test has its landing, WithFriction and WithoutFriction the same criteria
 TEST(TwoCylinders, CoarsePair_StaysWithFrictionAndFallsWithout) {
   const test::SceneRun with("two_cylinders_coarse", {}),
       without("two_cylinders_coarse", {"--set", test::kFrictionless});
@@ -48,6 +49,7 @@ TEST(TwoCylinders, CoarsePair_StaysWithFrictionAndFallsWithout) {
   EXPECT_LT(without.last("upper").com[2], 0.3);
 }
 
+// soak: long; scene_table_test has its landing, WithFriction the rest
 TEST(TwoCylinders, FinePair_TouchesAtSixtyContactsAndMore) {
   const test::SceneRun run("two_cylinders_fine", {"--time", "1.2"});
   run.expect_valid(100, "fine pair");

@@ -127,7 +127,7 @@ double cost_per_cell(const Subject &subject, uint32_t cubes, const Variant &vari
     const double begun = processor_time();
     double used = 0;
     int calls = 0;
-    for (; used < 0.1; ++calls, used = processor_time() - begun) body.forces();
+    for (; used < 0.02; ++calls, used = processor_time() - begun) body.forces();
     best = std::min(best, used / calls);
   }
   return best / body.solid.ncell();

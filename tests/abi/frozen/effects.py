@@ -18,7 +18,7 @@ import tempfile
 from frozen import TOLERANCE, counted
 
 HERE = pathlib.Path(__file__).resolve().parent
-STEPS = 6
+STEPS = 4
 LAW = {"mu_C": 0.3, "mu_S": 0.5, "sigma2": 200}
 LUGRE = {**LAW, "sigma0": 1e7}
 SPRINGS = {"volume": 1, "damping_stiffness": 1e-4, "anisotropy_slope": 0.5, "damper": "sls"}

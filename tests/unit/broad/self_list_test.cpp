@@ -278,6 +278,7 @@ double least_beyond(const Surface &s, double h, double offset) {
 
 // A sheet that turns, drifts and is rolled up and unrolled: far is never said where a pair is within reach,
 // whatever is kept from the last look, and is said where all are well apart.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(SelfList, SheetThatRollsUpAndUnrolls_IsFarOnlyWhereNoPairIsWithinReach) {
   constexpr uint32_t kSquares = 6;
   Surface s = sheet(kSquares);

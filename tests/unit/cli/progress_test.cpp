@@ -56,6 +56,7 @@ using std::chrono::milliseconds;
 }  // namespace
 
 // The line says where the time goes: steps per second alone would not.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Progress, Pictures_AreReportedWithTheirTime) {
   const Terminal terminal;
   if (!terminal.works()) GTEST_SKIP() << "this system gives no pseudo terminal";

@@ -57,6 +57,7 @@ bool in_cube(Vec3 p) {
 
 // Smooth walls: the error falls with the square of the cell. Rims and corners are rounded off by a
 // share of a cell.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(VoxelGrid, Distance_IsTrueToAShareOfACell) {
   const Mesh ball = sphere_mesh(0.5, 4), box = cube();
   double last = INFINITY;

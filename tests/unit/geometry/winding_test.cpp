@@ -78,6 +78,7 @@ TEST(Winding, NestedAndOverlappingShells_CountHowOften) {
   EXPECT_NEAR(tree_of(m).exactly_at({0.35, 0.02, 0.01}), 1, 1e-12);
 }
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Winding, Tree_WithinItsStatedErrorOfTheSum) {
   RestMesh ball = test::sphere_surface(0.3, 5), torus = test::torus_surface(0.3, 0.1, 80, 40);
   for (uint32_t t = 0; t < torus.ntri(); t += 37) test::flip(torus, t);

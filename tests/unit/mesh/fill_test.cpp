@@ -296,6 +296,7 @@ TEST(Fill, ShellsThroughEachOther_CountWhatIsInsideOnce) {
   EXPECT_NE(m.warnings[0].find("crosses itself"), std::string::npos);
 }
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Fill, CavityAndSecondPiece_AreSeen) {
   RestMesh hollow = test::sphere_surface(0.5, 5), inner = test::sphere_surface(0.3, 5);
   for (uint32_t t = 0; t < inner.ntri(); ++t) test::flip(inner, t);

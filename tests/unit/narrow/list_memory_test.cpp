@@ -10,6 +10,7 @@ using namespace dfm;
 using namespace test;
 
 // Surfaces roll over each other and tremble, fast and slowly, and their lists are renewed.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(FindContacts, KnownDistances_DoNotChangeContacts) {
   for (const uint32_t threads : {1u, 3u}) {
     Scene scene;

@@ -85,6 +85,7 @@ TEST(MeshObstacle, FeaturesThatMayTouchFirst_AreConvexOrOpen) {
 }
 
 // A body pair in which the other body has no dofs.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(MeshObstacle, Contacts_AreThoseOfABodyPair) {
   std::mt19937 random(11);
   std::uniform_real_distribution<double> u(-1, 1);

@@ -245,6 +245,7 @@ TEST(Box, BodyOnItsTop_UsesSurfelsAlone) {
 
 // The least distance over all contacts is the distance of body and obstacle, from every side; the surfels'
 // own distances are exact.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Obstacles, NearestContact_IsTheDistance) {
   std::mt19937 random(9);
   std::normal_distribution<double> normal;

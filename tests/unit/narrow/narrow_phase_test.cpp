@@ -101,6 +101,7 @@ TEST(VertexFace, SlideOverFlatTriangulation_SeesNoBump) {
 
 // Round a tessellated cylinder at a constant distance from its surface: one contact each, the normal within
 // the faces' own spread.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(VertexFace, SlideRoundCylinder_OneContactWithTurningNormal) {
   const int n = 32;
   Scene scene;

@@ -118,6 +118,7 @@ TEST(NormalCone, FlushBlocks_HaveNoContactAcrossTheirSides) {
 }
 
 // Half from either side, and the fine side's own half is the patch to a percent wherever the rims lie.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(NormalCone, BlockOnFlatBody_CarriesThePatchOnce) {
   for (const double off : {0.0, 0.1, 20.0, 50.0, 83.0, 120.0}) {
     Scene scene;

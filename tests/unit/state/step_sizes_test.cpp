@@ -129,6 +129,7 @@ TEST(StepSizes, BoundThatFallsInAStep_HalvesItsSubSteps) {
 
 // Steps of a host: in turn, in rhythm, and at random. Symplectic Euler moves single modes, from slow ones to
 // the stiffest that the bound allows; each takes the damping that is due.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(StepSizes, ThatAHostVaries_PutNoEnergyIntoAnyMode) {
   std::mt19937 random(7);
   const auto uniform = [&] { return double(random()) / 4294967296.0; };

@@ -217,6 +217,7 @@ TEST(Search, RaysAtASphere_AreThoseOfEveryTriangle) {
   }
 }
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Search, PointsAroundASphere_AreThoseOfEveryTriangle) {
   Soup s = from(test::sphere_mesh(1, 4));
   const dfm::Triangles m = s.renew();
