@@ -537,10 +537,9 @@ bool ToolTouch::begin(World &w, StepContext &step) {
     if (const ObstacleView &v = step.obstacle_views[i]; side_of_[i].tool != kNone)
       reach_[i] += kReach * h_ * fastest(side_of_[i], v.position, ball_around(v));
   find_near(step);
-  warn_passing(w, step);
   each_pair(w, step, [&](Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b) {
     const double deep = add_rows(pair, a, b, at_a, at_b);
-    if (!pair.jaw && inside(a, b, deep)) warn_deep(w, pair, deep, false);
+    if (!pair.jaw && inside(a, b, deep)) warn_deep(w, pair, deep);
   });
   if (rows_.empty()) return true;
   if (!follows_arcs(w, step)) return false;
