@@ -213,10 +213,9 @@ TEST(SceneErrors, Names_AreUniqueAndKnown) {
          {"/rigid={\"bodies\":[{\"name\":\"r\",\"shape\":\"sphere\",\"radius\":1,\"mass\":1},"
           "{\"name\":\"q\",\"id\":50,\"shape\":\"sphere\",\"radius\":1,\"mass\":1}]}",
           {"/rigid/bodies/1/id", "follow the first; omit it"}},
-         {"/contact/friction/0/between=[\"blok\",\"*\"]",
-          {"/contact/friction/0/between/0", "did you mean \"block\"?"}},
+         {"/contact/friction/0/between=[\"blok\",\"*\"]", {"/contact/friction/0", "did you mean 'block'?"}},
          {"/contact/friction/0/between=[\"block\"]", {"/contact/friction/0/between", "two sides"}},
-         {"/contact/friction/0/between=[\"material=steel\",\"*\"]", {"/contact/friction/0/between/0", "gel"}},
+         {"/contact/friction/0/between=[\"material=steel\",\"*\"]", {"/contact/friction/0", "gel"}},
          {"/probes/0/body=\"floor\"", {"/probes/0/body", "block"}},
          {"/probes/-={\"name\":\"tip\",\"body\":\"block\",\"point\":[0,0,0]}", {"/probes/1/name", "taken"}},
          {"/probes/0/point=[5,5,5]", {"/probes/0/point", "away"}},
