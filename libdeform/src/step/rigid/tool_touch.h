@@ -150,7 +150,6 @@ class ToolTouch {
     RigidSet *set;                    // nullptr: things that do not yield
     std::vector<Vec3> center, belt;   // [n] of these things; m/s
     std::vector<double> response;     // [6 bodies,6 bodies] 1/kg, of one group after another
-    std::vector<double> basis;        // scratch of clean_response()
     std::vector<size_t> first, wide;  // [groups] where it begins (kNone: none), 6 bodies
     std::vector<uint8_t> jointed;     // [groups]
     std::vector<double> free, now;    // [6n] m/s, rad/s: without contact, at the present impulses
@@ -221,7 +220,6 @@ class ToolTouch {
   bool is_driven(const Side &side, Vec3 along) const;
   void begin_passes();
   void request_again(Moved &m);
-  static void clean_response(Moved &m, uint32_t group);
   // tool_swept.cpp
   static double thickness(const Obstacle &o);
   bool goes_far_for_size(const Pair &pair) const;
