@@ -327,11 +327,12 @@ bool ToolTouch::cull_facing(ToolShape &a, ToolShape &b, double far, bool flat) {
   }
   if (norm(a.position() - b.position()) - a.reach() - b.reach() > far) return false;
   const Vec3 wide = {far, far, far};
-  const ToolBox of_a = a.bounds(), of_b = b.bounds();
-  const ToolBox near = {of_b.lo - wide, of_b.hi + wide};
-  if (!near.holds(of_a.lo, of_a.hi)) return false;
-  a.look_at(near, flat);
-  b.look_at({of_a.lo - wide, of_a.hi + wide}, flat);
+  Extent of_a = a.bounds(), of_b = b.bounds();
+  if (!of_a.meets(of_b, far)) return false;
+  of_a.grow(wide);
+  of_b.grow(wide);
+  a.look_at(of_b, flat);
+  b.look_at(of_a, flat);
   return true;
 }
 
