@@ -9,7 +9,6 @@
 namespace dfm {
 namespace {
 
-constexpr uint32_t kLeaf = 8;
 constexpr double kPi = 3.14159265358979323846;
 
 // Sum of the angles of plane vectors (x, y), in turns, without one arctangent per vector: complex numbers are
