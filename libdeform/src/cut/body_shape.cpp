@@ -88,16 +88,6 @@ void keep_params(Body &b, const BodyShape &before) {
   b.model.params = values;
 }
 
-// Makes the present model of the body for its present mesh.
-void make_model_again(Body &b, const BodyShape &before, ModelOrigin origin) {
-  Dampers kept = b.p.dampers;
-  exchange(b, *make_body_model(*b.world, b, *before.model.type, std::move(origin),
-                               static_cast<int32_t>(before.integrator.used)));
-  std::swap(b.p.dampers, kept);
-  keep_integrator(b, before.integrator);
-  keep_params(b, before);
-}
-
 // Puts the shape into the body; the last steps may fail, which undoes it.
 template <class Finish>
 std::unique_ptr<BodyShape> put(Body &b, std::unique_ptr<BodyShape> shape, Finish &&finish) {
@@ -225,13 +215,6 @@ std::shared_ptr<const BoxTree> tree_at_rest(const Memory &m, const Body &b) {
   return tree;
 }
 
-// The part of the present mesh of b, without what put() adds.
-std::unique_ptr<BodyShape> part_of(const Body &b, const CutMesh &mesh, Array<uint64_t> &&open) {
-  std::unique_ptr<BodyShape> out = structure_of_part(b, mesh, std::move(open), false);
-  take_points(b.world->memory(), b, mesh, surfels_before(b, mesh, out->surface), *out);
-  return out;
-}
-
 ModelOrigin origin_of(const Body &b, const CutMesh &mesh) {
   ModelOrigin origin = b.origin;
   take_rows(b.origin.held, mesh.point, 1, origin.held);
@@ -274,14 +257,14 @@ std::unique_ptr<MadeShape> make_shape(const Body &b, CutMesh &&mesh, Array<uint6
   return out;
 }
 
-std::unique_ptr<BodyShape> take_shape(Body &b, MadeShape &made, bool parts, bool ahead) {
+std::unique_ptr<BodyShape> take_shape(Body &b, MadeShape &made, bool parts, bool ahead, const Body *from) {
   World &w = *b.world;
   const CutMesh &mesh = made.mesh;
   std::unique_ptr<BodyShape> shape = std::move(made.shape);
   shape->shape = ++w.shapes;
   exchange(b, *shape);
   try {
-    const BodyShape &before = *shape;
+    const BodyShape &before = from ? static_cast<const BodyShape &>(*from) : *shape;
     take_points(w.memory(), before, mesh, made.surfel, b);
     update_inverse_mass(b.p);
     carry_loads(before, mesh, parts, b);
@@ -290,7 +273,8 @@ std::unique_ptr<BodyShape> take_shape(Body &b, MadeShape &made, bool parts, bool
     if (ahead) b.integrator.step = step;
     keep_integrator(b, before.integrator);
     carry_state(before, mesh, made.edge, b);
-    b.former_surface.reset(new FormerSurface{before.shape, b.shape, made.features, std::move(made.list)});
+    if (!from)
+      b.former_surface.reset(new FormerSurface{before.shape, b.shape, made.features, std::move(made.list)});
   } catch (...) {
     exchange(b, *shape);
     throw;
@@ -335,18 +319,11 @@ std::unique_ptr<Body> structure_left(const Body &before, MadeShape &made) {
 }
 
 void shape_piece(const Body &from, CutMesh &&mesh, Array<uint64_t> &&open, Body &piece) {
-  std::unique_ptr<BodyShape> shape = part_of(from, mesh, std::move(open));
-  Surface &s = shape->surface;
-  s.named = from.surface.named;
+  const std::unique_ptr<MadeShape> made = make_shape(from, std::move(mesh), std::move(open), nullptr);
   NamedBy there{from.id, {}};
-  std::copy(shape->cut.next_name, shape->cut.next_name + kFeatureKinds, there.below);
-  s.named.push_back(there);
-  ModelOrigin origin = origin_of(from, mesh);
-  put(piece, std::move(shape), [&](const BodyShape &) {
-    carry_loads(from, mesh, true, piece);
-    make_model_again(piece, from, std::move(origin));
-    carry_state(from, mesh, edges_before(from.edges, mesh, piece.edges), piece);
-  });
+  std::ranges::copy(made->shape->cut.next_name, there.below);
+  made->shape->surface.named.push_back(there);
+  take_shape(piece, *made, true, false, &from);
 }
 
 std::unique_ptr<BodyShape> restore_shape(Body &b, const Body &like, std::shared_ptr<const WholeBody> whole,

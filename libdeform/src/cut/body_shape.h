@@ -39,8 +39,10 @@ std::unique_ptr<MadeShape> make_shape(const Body &b, CutMesh &&mesh, Array<uint6
 std::unique_ptr<Body> structure_of(const Body &b);
 std::unique_ptr<Body> structure_left(const Body &before, MadeShape &made);
 // Puts it into the body, with the state of the body, as cut_body() does. ahead: as it was made; the longest
-// explicit sub-step is that at rest then, and not that of now.
-std::unique_ptr<BodyShape> take_shape(Body &b, MadeShape &made, bool parts, bool ahead);
+// explicit sub-step is that at rest then, and not that of now. from: the body that this is a piece of; null:
+// itself.
+std::unique_ptr<BodyShape> take_shape(Body &b, MadeShape &made, bool parts, bool ahead,
+                                      const Body *from = nullptr);
 
 // Gives `b` the mesh that a cut leaves, and returns the previous shape; exchange() with it undoes the cut.
 // open: faces of the whole body. State, loads, springs, motions and held points follow the points; the state

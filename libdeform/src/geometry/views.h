@@ -17,6 +17,7 @@ struct BodyView {
   // surface->x: start of the sub-step; surface->v: velocity without contact (mean over the sub-step)
   const Surface *surface;
   bool asleep = false;  // x is constant; it can touch only things that are awake or move
+  double speed = -1;    // m/s, bound over the surfels; negative: not known
 };
 
 enum class Shape : uint8_t { plane = 0, sphere = 1, box = 2, capsule = 3, mesh = 4, voxels = 5, none = 6 };

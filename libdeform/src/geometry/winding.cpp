@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
-#include "math/extent.h"
+#include "geometry/box_tree.h"
 
 namespace dfm {
 namespace {
 
-constexpr uint32_t kLeaf = 8;
 constexpr double kPi = 3.14159265358979323846;
 
 // Sum of the angles of plane vectors (x, y), in turns, without one arctangent per vector: complex numbers are
@@ -65,47 +65,26 @@ void add_triangle(AngleSum &sum, Vec3 a, Vec3 b, Vec3 c, double flat = -1) {
 
 WindingTree::WindingTree(const Memory &memory, const double *points, uint32_t ntri, const uint32_t *tris)
     : boxes_(memory), corners_(memory) {
-  Array<Vec3> centers{memory};
-  Array<uint32_t> order{memory};
-  centers.reserve(ntri);
-  order.reserve(ntri);
-  corners_.reserve(3 * size_t(ntri));
-  for (uint32_t t = 0; t < ntri; ++t) {
-    const uint32_t *c = tris + 3 * size_t(t);
-    centers.push_back((1.0 / 3) * (load3(points + 3 * size_t(c[0])) + load3(points + 3 * size_t(c[1])) +
-                                   load3(points + 3 * size_t(c[2]))));
-    order.push_back(t);
+  const std::span<const uint32_t> corners{tris, 3 * size_t{ntri}};
+  Array<double> x{memory};
+  for (const uint32_t c : corners) x.resize(std::max(x.size(), 4 * (size_t{c} + 1)), 0.0);
+  for (const uint32_t c : corners) std::copy_n(points + 3 * size_t{c}, 3, &x[4 * size_t{c}]);
+  BoxTree tree(memory);
+  tree.build(corners, x.data());
+  Array<uint32_t> order(tree.triangles());
+  boxes_.resize(tree.nodes().size());
+  for (size_t k = boxes_.size(); k-- > 0;) {
+    const auto [right, count] = tree.nodes()[k];
+    Box &box = boxes_[k];
+    box.begin = count ? right : boxes_[k + 1].begin;
+    box.end = count ? right + count : boxes_[right].end;
+    box.right = count ? 0 : right;
+    // in a leaf they come in an order of the standard library's own, and they are summed
+    if (count) std::sort(order.begin() + right, order.begin() + right + count);
   }
-  if (ntri) build(points, tris, centers, order, 0, ntri);
-}
-
-uint32_t WindingTree::build(const double *points, const uint32_t *tris, Array<Vec3> &centers,
-                            Array<uint32_t> &order, uint32_t begin, uint32_t end) {
-  const uint32_t number = uint32_t(boxes_.size());
-  boxes_.push_back({});
-  boxes_[number].begin = begin;
-  boxes_[number].end = end;
-  if (end - begin <= kLeaf) {
-    // nth_element leaves them in an order of the standard library's own, and they are summed
-    std::sort(order.begin() + begin, order.begin() + end);
-    for (uint32_t i = begin; i < end; ++i)
-      for (int k = 0; k < 3; ++k)
-        corners_.push_back(load3(points + 3 * size_t(tris[3 * size_t(order[i]) + k])));
-  } else {
-    Extent box;
-    for (uint32_t i = begin; i < end; ++i) box.add(centers[order[i]]);
-    const int axis = box.longest_axis();
-    const uint32_t middle = begin + (end - begin) / 2;
-    std::nth_element(
-        order.begin() + begin, order.begin() + middle, order.begin() + end, [&](uint32_t i, uint32_t j) {
-          return centers[i][axis] != centers[j][axis] ? centers[i][axis] < centers[j][axis] : i < j;
-        });
-    build(points, tris, centers, order, begin, middle);
-    const uint32_t right = build(points, tris, centers, order, middle, end);
-    boxes_[number].right = right;
-  }
-  sum_up(boxes_[number]);
-  return number;
+  for (const uint32_t t : order)
+    for (size_t k = 0; k < 3; ++k) corners_.push_back(load3(&x[4 * size_t{tris[3 * size_t{t} + k]}]));
+  for (Box &box : boxes_) sum_up(box);
 }
 
 void WindingTree::sum_up(Box &box) const {

@@ -26,14 +26,12 @@ class WindingTree {
 
  private:
   struct Box {
-    Vec3 center, area;    // area-weighted center; sum of the triangles' area vectors
-    double moment[3][3];  // sum of (triangle's center - center) x area vector
-    double reach;         // farthest corner from the center
-    uint32_t begin, end;  // triangles
-    uint32_t right;       // second child; the first is the next box. 0: a leaf
+    Vec3 center, area;         // area-weighted center; sum of the triangles' area vectors
+    double moment[3][3] = {};  // sum of (triangle's center - center) x area vector
+    double reach = 0;          // farthest corner from the center
+    uint32_t begin, end;       // triangles
+    uint32_t right;            // second child; the first is the next box. 0: a leaf
   };
-  uint32_t build(const double *points, const uint32_t *tris, Array<Vec3> &centers, Array<uint32_t> &order,
-                 uint32_t begin, uint32_t end);
   void sum_up(Box &box) const;
 
   Array<Box> boxes_;

@@ -158,14 +158,6 @@ constexpr size_t kBlock = 96;
 
 }  // namespace
 
-NarrowBlocks::NarrowBlocks(const Memory &m) : memory_(&m), ranges_(m), speed_(m) {}
-
-double NarrowBlocks::speed(std::span<const BodyView> bodies, size_t i) {
-  if (speed_.size() != bodies.size()) speed_.assign(bodies.size(), -1.0);
-  if (speed_[i] < 0) speed_[i] = largest_speed(*bodies[i].surface);
-  return speed_[i];
-}
-
 void NarrowBlocks::add(const Array<Candidate> &list, Range run) {
   const size_t end = run.end;
   const auto add_to = [&](size_t at) {
@@ -200,8 +192,7 @@ void find_contacts(std::span<const BodyView> bodies, std::span<const ObstacleVie
   const auto speed_of = [&](int side, uint32_t slot) {
     const BodyView *const b = find_slot(bodies, slot);
     if (std::exchange(fast[side].body, b) != b)
-      fast[side].speed =
-          blocks ? blocks->speed(bodies, size_t(b - bodies.data())) : largest_speed(*b->surface);
+      fast[side].speed = b->speed < 0 ? largest_speed(*b->surface) : b->speed;
     return fast[side].speed;
   };
   size_t number = 0;  // of the run
@@ -217,7 +208,6 @@ void find_contacts(std::span<const BodyView> bodies, std::span<const ObstacleVie
     else find(narrow::Run(&c, run.end - run.begin), run, out);
   }
   if (parts) blocks->run(*tasks, candidates, find, out);
-  if (blocks) blocks->forget_speeds();
   Areas(bodies, obstacles, out, lent).share();
 }
 

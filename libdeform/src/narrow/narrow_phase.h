@@ -26,16 +26,8 @@ namespace dfm {
 // alone, contacts are joined in its order, and blocks are independent: the bits are those of one thread.
 class NarrowBlocks {
  public:
-  explicit NarrowBlocks(const Memory &memory);
+  explicit NarrowBlocks(const Memory &memory) : memory_(&memory), ranges_(memory) {}
   void start() { ranges_.clear(); }
-  // m/s, bound over the surfels of body view i: set by set_speed() since the last find_contacts(), or
-  // computed once in it.
-  void set_speed(std::span<const BodyView> bodies, size_t i, double speed) {
-    if (speed_.size() != bodies.size()) speed_.assign(bodies.size(), -1.0);
-    speed_[i] = speed;
-  }
-  double speed(std::span<const BodyView> bodies, size_t i);
-  void forget_speeds() { speed_.clear(); }
   struct Range {  // of the list: candidates of one pair and kind
     size_t begin, end;
     double speed;      // m/s, bound over body b's surfels
@@ -59,7 +51,6 @@ class NarrowBlocks {
  private:
   const Memory *memory_;
   Array<Range> ranges_;
-  Array<double> speed_;
   std::vector<Array<ContactPoint>> found_;  // by piece
 };
 

@@ -365,33 +365,16 @@ void read_materials(const Node &scene, Definition &def, ReadContext &context) {
                                                : read_extra(value, key, context.types));
     }
     context.materials.push_back(m.name);
-    context.titles.push_back(m.title);
     def.materials.push_back(std::move(m));
   }
 }
 
-// A side of a pair: "*", a body or an obstacle, "material=NAME", "body:GROUP" (whose groups the world knows
-// once the body is there).
-std::string read_side(const Node &side, const ReadContext &context, bool grouped) {
-  const std::string text = side.text();
-  if (text == "*") return text;
-  if (text.rfind("material=", 0) == 0) {
-    json name = text.substr(9);
-    return "material=" + known(Node(&name, side.pointer(), &side.file()), context.titles, "material");
-  }
-  const size_t colon = text.find(':');
-  if (colon == std::string::npos) return known(side, context.sides, "body or obstacle");
-  json name = text.substr(0, colon);
-  known(Node(&name, side.pointer(), &side.file()), context.sides, "body or obstacle");
-  if (!grouped) side.fail("groups of a surface choose friction, not whether it touches; name the whole body");
-  return text;
-}
-
-void read_between(const Node &entry, const ReadContext &context, bool grouped, std::string out[2]) {
+// The world knows the sides: groups of a surface are there once the body is.
+void read_between(const Node &entry, std::string out[2]) {
   const Node between = entry.at("between");
   const std::vector<Node> sides = between.items();
   if (sides.size() != 2) between.fail("expected two sides [a, b], found %zu", sides.size());
-  for (int i = 0; i < 2; ++i) out[i] = read_side(sides[i], context, grouped);
+  for (int i = 0; i < 2; ++i) out[i] = sides[i].text();
 }
 
 void read_contact(const Node &scene, Definition &def, const ReadContext &context) {
@@ -435,15 +418,13 @@ void read_contact(const Node &scene, Definition &def, const ReadContext &context
     entry.object("friction");
     Friction f;
     f.pointer = entry.pointer();
-    read_between(entry, context, true, f.between);
+    read_between(entry, f.between);
     const dfm_type *type = read_type(entry.at("law"), DFM_KIND_FRICTION, context.types);
     f.law = type->id;
     if (entry.has("params")) f.params = read_params(entry.member("params"), type);
     if (entry.has("restitution")) {
-      const Node e = entry.member("restitution");
       f.def.flags = DFM_FRICTION_RESTITUTION;
-      f.def.restitution = e.number(kNotNegative);
-      if (f.def.restitution > 1) e.fail("expected a number from 0 to 1, found %g", f.def.restitution);
+      f.def.restitution = entry.member("restitution").number({0, 1});
     }
     def.friction.push_back(std::move(f));
   }
@@ -451,7 +432,7 @@ void read_contact(const Node &scene, Definition &def, const ReadContext &context
     entry.object("filter");
     Filter f;
     f.pointer = entry.pointer();
-    read_between(entry, context, false, f.between);
+    read_between(entry, f.between);
     f.collide = entry.boolean("collide", false);
     def.filters.push_back(std::move(f));
   }

@@ -10,8 +10,8 @@ namespace dfm::scene {
 
 struct ReadContext {
   const Registry &types;
-  std::vector<std::string> materials, titles;  // keys so far, and names for the sides of rules
-  std::vector<std::string> sides;              // bodies and obstacles
+  std::vector<std::string> materials;  // keys so far
+  std::vector<std::string> sides;      // bodies and obstacles
   std::vector<std::string> bodies{};
   bool planned = false;  // the planner chooses models that are not named
 };

@@ -269,9 +269,6 @@ void read_switches(const Node &list, const Registry &types, Body &b) {
     s.t = entry.at("t").number(Range{0, HUGE_VAL, false, true});
     s.model = read_model(entry, types);
     if (entry.has("max_jump")) s.max_jump = entry.member("max_jump").number(kPositive);
-    if (!b.switches.empty() && s.t < b.switches.back().t)
-      entry.at("t").fail("times of switches must not decrease; found %g s after %g s", s.t,
-                         b.switches.back().t);
     b.switches.push_back(std::move(s));
   }
 }
@@ -292,8 +289,6 @@ void read_rule(const Node &rule, const Registry &types, SwitchRule &out) {
   out.near = read_word(rule, "near", types);
   rule.at("far");
   out.far = read_word(rule, "far", types);
-  if (out.touching.type.empty() && out.near.type.empty())
-    rule.fail("expected \"touching\" or \"near\" beside \"far\"");
   if (!out.near.type.empty()) {
     rule.at("point").vector(out.values.point);
     out.values.distance = rule.at("distance").number(kPositive);

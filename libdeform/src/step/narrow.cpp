@@ -47,8 +47,7 @@ void drop_false_depths(World &w, StepContext &step) {
 }  // namespace
 
 Next stage_narrow(World &w, StepContext &step, uint32_t *) {
-  step.narrow.forget_speeds();
-  for (const uint32_t i : step.active) step.narrow.set_speed(step.body_views, i, step.broad.speed(i));
+  for (const uint32_t i : step.active) step.body_views[i].speed = step.broad.speed(i);
   const bool known = w.plan.has(StageRole::guards);
   if (known) follow_pairs(w, step, false);
   find_contacts(step.body_views, step.obstacle_views, step.broad.candidates(), step.h, w.offset,

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <numeric>
+#include <span>
 
 #include "body/make_surface.h"
 #include "core/error.h"
@@ -32,7 +34,7 @@ constexpr char kMaxJump[] = "max_jump";
 // Largest displacement of the surface, relative to the size of the body, by a model that steps itself.
 constexpr double kSurfaceStays = 1e-6;
 constexpr double kInstant = 1e-9;  // s, too short for any motion
-constexpr double kSlender = 1e-3;  // of the longest arm: shorter arms define no direction
+constexpr double kSlender = 1e-3;  // of the size: less across a line defines no direction
 constexpr double kOnTime = 1e-6;   // of a step: a switch may be early by this share
 constexpr size_t kMaxSwaps = 4096;
 constexpr size_t kSpares = 2;  // a rule has three models
@@ -42,87 +44,62 @@ constexpr size_t kSpares = 2;  // a rule has three models
 Vec3 rest_of(const Body &b, uint32_t i) { return b.p.rest_at(i); }
 Vec3 now_of(const Body &b, uint32_t i) { return b.p.x_at(i); }
 
-// Orthonormal axes: the first along a, the second in the plane of a and b; row-major, by rows. Returns false
-// if a and b are parallel.
-bool axes_of(Vec3 a, Vec3 b, double *out) {
-  if (!(norm(a) > 0)) return false;
-  const Vec3 x = (1 / norm(a)) * a, aside = b - dot(b, x) * x;
-  if (!(norm(aside) > kSlender * norm(a))) return false;
-  const Vec3 y = (1 / norm(aside)) * aside;
-  store3(out, x);
-  store3(out + 3, y);
-  store3(out + 6, cross(x, y));
-  return true;
+struct Middle { Vec3 rest, now; };
+
+Middle middle_of(const Body &b, std::span<const double> weight, double all) {
+  Middle out;
+  for (uint32_t i = 0; i < b.p.n; ++i) {
+    out.rest += (weight[i] / all) * rest_of(b, i);
+    out.now += (weight[i] / all) * now_of(b, i);
+  }
+  return out;
 }
 
-// The held point farthest from `from` or, if `line` is not zero, from the line along it.
-uint32_t farthest_held(const Body &b, Vec3 from, Vec3 line) {
-  uint32_t found = kNone;
-  double most = 0;
-  for (uint32_t i = 0; i < b.p.n; ++i) {
-    if (b.p.held[i] != 7) continue;
-    const Vec3 arm = rest_of(b, i) - from;
-    const double d = norm2(line) > 0 ? norm2(cross(line, arm)) : norm2(arm);
-    if (d > most) {
-      most = d;
-      found = i;
+// The rotation of the linear map from the rest shape to the present one, by least squares. flat: the points
+// may lie in a plane, whose normal then turns with them. Returns false if there is none.
+bool turn_of(const Body &b, std::span<const double> weight, const Middle &middle, bool flat, double *r) {
+  Vec3 a[3], s[3];  // columns of the sums of m x X^T, m X X^T
+  const auto add = [&](double m, Vec3 x, Vec3 rest) {
+    for (int k = 0; k < 3; ++k) {
+      a[k] += rest[k] * (m * x);
+      s[k] += rest[k] * (m * rest);
     }
-  }
-  return found;
-}
-
-// The rotation of the held points, if they are not on a line: they fix the orientation of the shape.
-bool turn_of_held(const Body &b, double *r) {
-  const auto first = std::find(b.p.held.begin(), b.p.held.end(), uint8_t{7});
-  if (first == b.p.held.end()) return false;
-  const uint32_t o = static_cast<uint32_t>(first - b.p.held.begin());
-  const uint32_t i = farthest_held(b, rest_of(b, o), {});
-  if (i == kNone) return false;
-  const uint32_t j = farthest_held(b, rest_of(b, o), rest_of(b, i) - rest_of(b, o));
-  if (j == kNone) return false;
-  double rest[9], now[9];
-  if (!axes_of(rest_of(b, i) - rest_of(b, o), rest_of(b, j) - rest_of(b, o), rest)) return false;
-  if (!axes_of(now_of(b, i) - now_of(b, o), now_of(b, j) - now_of(b, o), now)) return false;
-  for (int row = 0; row < 3; ++row)
-    for (int col = 0; col < 3; ++col)
-      r[3 * row + col] = (now[row] * rest[col] + now[3 + row] * rest[3 + col]) + now[6 + row] * rest[6 + col];
-  return true;
-}
-
-// The rotation of the linear map from the rest shape to the present one, by mass-weighted least squares.
-// Returns false if there is none.
-bool turn_of_all(const Body &b, Vec3 rest_center, Vec3 center, double *r) {
-  double a[9] = {}, s[9] = {};  // sums of m x X^T, m X X^T
-  for (uint32_t i = 0; i < b.p.n; ++i) {
-    const Vec3 x = now_of(b, i) - center, rest = rest_of(b, i) - rest_center;
-    for (int row = 0; row < 3; ++row)
-      for (int col = 0; col < 3; ++col) {
-        a[3 * row + col] += b.p.mass[i] * x[row] * rest[col];
-        s[3 * row + col] += b.p.mass[i] * rest[row] * rest[col];
+  };
+  for (uint32_t i = 0; i < b.p.n; ++i) add(weight[i], now_of(b, i) - middle.now, rest_of(b, i) - middle.rest);
+  if (flat) {
+    Vec3 normal, turned;
+    for (int k = 0; k < 3; ++k)
+      if (const Vec3 n = cross(s[k], s[(k + 1) % 3]); norm2(n) > norm2(normal)) {
+        normal = n;
+        turned = cross(a[k], a[(k + 1) % 3]);
       }
+    const double size = s[0].x + s[1].y + s[2].z;
+    if (!(norm(normal) > kSlender * kSlender * size * size)) return false;  // they are on a line
+    add(size, normalized(turned), normalized(normal));
   }
-  const Vec3 columns[3] = {{s[0], s[3], s[6]}, {s[1], s[4], s[7]}, {s[2], s[5], s[8]}};
-  const Vec3 rows[3] = {cross(columns[1], columns[2]), cross(columns[2], columns[0]),
-                        cross(columns[0], columns[1])};  // inverse times determinant
+  const Vec3 rows[3] = {cross(s[1], s[2]), cross(s[2], s[0]),
+                        cross(s[0], s[1])};  // inverse times determinant
   double f[9] = {};
   for (int row = 0; row < 3; ++row)
     for (int col = 0; col < 3; ++col)
-      for (int k = 0; k < 3; ++k) f[3 * row + col] += a[3 * row + k] * rows[k][col];
+      for (int k = 0; k < 3; ++k) f[3 * row + col] += a[k][row] * rows[k][col];
   return polar_rotation(f, r);
 }
 
 // The frame of the rest shape for a model whose forces do not rotate with the body: the present rotation of
-// the body. Such a model is valid for small rotations relative to this frame.
+// the body, of its held points where these are not on a line. Such a model is valid for small rotations
+// relative to this frame.
 Pose frame_of(const Body &b) {
-  Vec3 rest_center, center;
-  for (uint32_t i = 0; i < b.p.n; ++i) {
-    rest_center += (b.p.mass[i] / b.mass) * rest_of(b, i);
-    center += (b.p.mass[i] / b.mass) * now_of(b, i);
-  }
+  const Middle middle = middle_of(b, b.p.mass, b.mass);
+  std::vector<double> held;
+  for (const uint8_t axes : b.p.held) held.push_back(axes == 7);
+  const double all = std::accumulate(held.begin(), held.end(), 0.0);
   double r[9];
   Pose frame = b.origin.frame;
-  if (turn_of_held(b, r) || turn_of_all(b, rest_center, center, r)) frame.rotation = quat_of(r);
-  frame.position = center - rotate(frame.rotation, rest_center);
+  if ((all > 0 && turn_of(b, held, middle_of(b, held, all), true, r)) ||
+      turn_of(b, b.p.mass, middle, false, r))
+    frame.rotation = quat_of(r);
+  frame.position = middle.now - rotate(frame.rotation, middle.rest);
   return frame;
 }
 

@@ -11,14 +11,6 @@
 namespace dfm {
 namespace {
 
-double ray_sphere(Vec3 o, Vec3 d, Vec3 center, double r) {
-  const Vec3 m = o - center;
-  const double b = dot(m, d), c = norm2(m) - r * r, disc = b * b - c;
-  if (disc < 0) return kFar;
-  const double root = std::sqrt(disc), t = -b - root;
-  return t >= 0 ? t : c < 0 ? -b + root : kFar;
-}
-
 // In the frame of the obstacle. From inside, the first hit is the point where the ray leaves.
 double ray_box(Vec3 o, Vec3 d, Vec3 half, Vec3 *normal) {
   double near = -kFar, far = kFar;
@@ -46,6 +38,7 @@ double ray_box(Vec3 o, Vec3 d, Vec3 half, Vec3 *normal) {
   return near >= 0 ? near : far;
 }
 
+// A sphere is a capsule without length.
 double ray_capsule(Vec3 o, Vec3 d, double r, double half, Vec3 *normal) {
   // A capsule is convex: from outside the first crossing of its parts counts, from inside the last.
   const bool inside = norm2(o - Vec3{0, 0, std::clamp(o.z, -half, half)}) < r * r;
@@ -114,10 +107,7 @@ double ray_obstacle(const Obstacle &ob, Vec3 origin, Vec3 direction, Vec3 *norma
     case Shape::plane:
       if (d.z != 0 && -o.z / d.z >= 0) t = -o.z / d.z;
       break;
-    case Shape::sphere:
-      t = ray_sphere(o, d, {}, ob.def.radius);
-      if (t < kFar) n = normalized(o + t * d);
-      break;
+    case Shape::sphere: t = ray_capsule(o, d, ob.def.radius, 0, &n); break;
     case Shape::box: t = ray_box(o, d, load3(ob.def.half_size), &n); break;
     case Shape::capsule: t = ray_capsule(o, d, ob.def.radius, ob.def.half_length, &n); break;
     default: break;

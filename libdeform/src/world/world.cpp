@@ -10,6 +10,7 @@
 #include "state/obstacle.h"
 #include "state/tool.h"
 #include "step/pair_table.h"
+#include "step/stages.h"
 
 namespace dfm {
 
@@ -23,17 +24,14 @@ World::World(dfm_context *c)
 
 World::~World() = default;
 
-namespace {
-// Lists are in the order of ids.
-template <class List>
-auto *of_id(const List &list, uint64_t id) {
-  const auto at = std::ranges::lower_bound(list, id, {}, [](const auto &x) { return x->id; });
-  return at != list.end() && (*at)->id == id ? at->get() : nullptr;
+Body *World::body(uint64_t id) const {
+  const uint32_t i = slot_of(*this, id);
+  return i == kNone ? nullptr : bodies[i].get();
 }
-}  // namespace
-
-Body *World::body(uint64_t id) const { return of_id(bodies, id); }
-Obstacle *World::obstacle(uint64_t id) const { return of_id(obstacles, id); }
+Obstacle *World::obstacle(uint64_t id) const {
+  const uint32_t i = obstacle_slot_of(*this, id);
+  return i == kNone ? nullptr : obstacles[i].get();
+}
 
 Body *World::find_body(const std::string &name) {
   for (auto *list : {&bodies, &emptied})

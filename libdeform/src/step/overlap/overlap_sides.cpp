@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "body/obstacle_mesh.h"
-#include "geometry/closest.h"
+#include "geometry/convex_gap.h"
 #include "geometry/pierce.h"
 #include "geometry/triangle_search.h"
 #include "geometry/voxel_grid.h"
@@ -213,21 +213,15 @@ Crossed cross_shape(OverlapSkin &a, const ObstacleShape &b, double offset) {
     out.depth = std::max(out.depth, -distance[s]);
     out.enclosed += distance[s] < 0;
   }
+  const Convex axis = convex_triangle(b.end(0), b.end(1), b.end(1));
   double nearest = std::numeric_limits<double>::infinity();  // of a triangle to the axis
   for (uint32_t t = 0; t < a.surface().ntri; ++t) {
     const uint32_t *const c = &a.surface().tri[size_t{3} * t];
     const double d[3] = {distance[c[0]], distance[c[1]], distance[c[2]]};
     double least = std::min({d[0], d[1], d[2]});
     if (!plane && least > 0) {  // a shape smaller than the triangle
-      const Vec3 x[3] = {a.corner(t, 0), a.corner(t, 1), a.corner(t, 2)};
-      double away2 = std::min(closest_on_triangle(b.end(0), x[0], x[1], x[2]).distance2,
-                              closest_on_triangle(b.end(1), x[0], x[1], x[2]).distance2);
-      for (int k = 0; k < 3; ++k)
-        away2 = std::min(away2, closest_segments(x[k], x[(k + 1) % 3], b.end(0), b.end(1)).distance2);
-      const double sides[2] = {tet_volume(x[0], x[1], x[2], b.end(0)),
-                               tet_volume(x[0], x[1], x[2], b.end(1))};
-      if (pierce(b.end(0), b.end(1), x, sides[0], sides[1]) >= 0) away2 = 0;
-      least = std::sqrt(away2) - view.radius;
+      const ConvexGap gap = convex_gap(convex_triangle(a.corner(t, 0), a.corner(t, 1), a.corner(t, 2)), axis);
+      least = (gap.apart ? gap.distance : 0) - view.radius;
       nearest = std::min(nearest, least);
     }
     out.crossings += least < 0 && std::max({d[0], d[1], d[2]}) > 0;

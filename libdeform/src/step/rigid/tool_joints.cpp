@@ -2,8 +2,6 @@
 // joints and the motors that hold (dynamics/rigid/builtin.cpp), so contact never violates joints.
 //
 //   near     the matrix is computed for groups that something is near, because it costs more than a free body
-//   rank     of a matrix is that of the motions that joints and motors allow; the rest of it is rounding, and
-//            taken out
 //   motors   decided again in each pass, by the impulses of soft bodies and of the rows
 #include <algorithm>
 #include <cmath>
@@ -23,7 +21,6 @@ constexpr double kHeld = 1e-9;     // of the answer without joints: less is roun
 constexpr double kStronger = 0.1;  // of what a place yields where a motor holds that is not at its limit yet
 constexpr double kMaxStrong = 1e-6;  // of it: no place gives less
 constexpr double kDriven = 0.01;     // sine: a motor moves a place along a direction
-constexpr double kRank = 1e-12;      // of the answer without joints: less is rounding
 
 bool is_moved(const RigidSet &set, uint32_t body) { return set.group[body] != DFM_RIGID_STILL; }
 
@@ -100,7 +97,6 @@ void ToolTouch::request_response(Moved &m, uint32_t g) {
   need_memory(fault.status);
   if (fault) return;
   m.first[g] = at;
-  if (m.jointed[g]) clean_response(m, g);
 }
 
 // Of the group of this side, if it has joints and its response has not been needed yet.
@@ -182,45 +178,6 @@ bool ToolTouch::press_harder() {
   strong_ *= kStronger;
   begin_passes();
   return true;
-}
-
-// response = B B^T by Cholesky's method with pivots, without what has a smaller pivot than rounding.
-void ToolTouch::clean_response(Moved &m, uint32_t g) {
-  const size_t wide = m.wide[g];
-  double *const response = &m.response[m.first[g]];
-  std::vector<double> &basis = m.basis;  // [wide,rank] by columns, and two columns more
-  basis.resize(wide * wide + 2 * wide);
-  double *const left = &basis[wide * wide], *const least = left + wide;
-  for (size_t i = 0; i < m.set->defs.size(); ++i) {
-    if (m.set->group[i] != g) continue;
-    const dfm_rigid_def &d = m.set->defs[i];
-    const double turns = 1 / std::min({d.inertia[0], d.inertia[1], d.inertia[2]});
-    for (size_t c = 0; c < 6; ++c) {
-      const size_t r = 6 * size_t{m.set->place[i]} + c;
-      left[r] = response[r * wide + r];
-      least[r] = kRank * (c < 3 ? 1 / d.mass : turns);
-    }
-  }
-  size_t rank = 0;
-  for (; rank < wide; ++rank) {
-    size_t pivot = 0;
-    for (size_t r = 1; r < wide; ++r)
-      if (left[r] * least[pivot] > left[pivot] * least[r]) pivot = r;
-    if (!(left[pivot] > least[pivot])) break;
-    const double scale = 1 / std::sqrt(left[pivot]);
-    double *const column = &basis[rank * wide];
-    for (size_t r = 0; r < wide; ++r) {
-      double sum = response[r * wide + pivot];
-      for (size_t c = 0; c < rank; ++c) sum -= basis[c * wide + r] * basis[c * wide + pivot];
-      column[r] = scale * sum;
-      left[r] -= column[r] * column[r];
-    }
-    left[pivot] = 0;
-  }
-  std::fill_n(response, wide * wide, 0.0);
-  for (size_t c = 0; c < rank; ++c)
-    for (size_t r = 0; r < wide; ++r)
-      for (size_t k = 0; k < wide; ++k) response[r * wide + k] += basis[c * wide + r] * basis[c * wide + k];
 }
 
 }  // namespace dfm

@@ -40,7 +40,7 @@ PairSides pair_sides(const World &w, const ContactStore &s, uint32_t i) {
 }
 
 std::string ToolTouch::row_names(const World &w, uint32_t row) const {
-  const uint64_t *const ids = rows_[row].pair->id;
+  const auto &ids = rows_[row].pair->id;
   return format("'%s' and '%s'", name_of(w, ids[0]).c_str(), name_of(w, ids[1]).c_str());
 }
 

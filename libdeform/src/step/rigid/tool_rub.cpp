@@ -22,10 +22,9 @@ constexpr double kArea = 1e-4;  // m2
 
 }  // namespace
 
-uint64_t ToolTouch::key_of(const uint64_t pair[2], Name name) {
+uint64_t ToolTouch::key_of(const std::array<uint64_t, 2> &pair, Name name) {
   Hash h;
-  h.add(pair[0]);
-  h.add(pair[1]);
+  for (const uint64_t id : pair) h.add(id);
   for (const uint32_t x : {uint32_t{name.kind}, name.first, name.second}) h.add(x);
   return h.value;
 }

@@ -16,15 +16,14 @@ constexpr double kSharp = 0.1;   // sine: by more, all edges of a sharp corner f
 constexpr double kCross = 1e-6;  // sine between edges that have a normal
 constexpr double kSteep = 0.1;   // component of a normal; with a smaller one a plane bounds no axis
 
-Vec3 least(Vec3 a, Vec3 b) { return {std::min(a.x, b.x), std::min(a.y, b.y), std::min(a.z, b.z)}; }
-Vec3 most(Vec3 a, Vec3 b) { return {std::max(a.x, b.x), std::max(a.y, b.y), std::max(a.z, b.z)}; }
+template <class... Points>
+Extent box_of(Points... at) {
+  Extent box;
+  (box.add(at), ...);
+  return box;
+}
 
 }  // namespace
-
-bool ToolBox::holds(Vec3 from, Vec3 to) const {
-  const Vec3 a = least(from, to), b = most(from, to);
-  return a.x <= hi.x && a.y <= hi.y && a.z <= hi.z && b.x >= lo.x && b.y >= lo.y && b.z >= lo.z;
-}
 
 bool ToolShape::Edge::is_outward(Vec3 n, double turn) const {
   for (int k = 0; k < faces; ++k)
@@ -62,20 +61,17 @@ void ToolShape::take(const ObstacleView &view, ObstacleMesh *mesh) {
   reach_ = shape_.extent() + round_;
 }
 
-ToolBox ToolShape::bounds() const {
-  if (shape_.view().shape == Shape::mesh) {
-    const ObstacleMesh::Bounds &of = mesh_->bounds();
-    return {of.lo, of.hi};
-  }
+Extent ToolShape::bounds() const {
+  if (shape_.view().shape == Shape::mesh) return mesh_->bounds();
   double lo[3], hi[3];
   shape_.bounds(lo, hi);
   return {load3(lo), load3(hi)};
 }
 
 // Box around that part of the bounds of the shape that lies at dot(normal, x) <= height.
-ToolBox ToolShape::under(Vec3 normal, double height) const {
-  const ToolBox all = bounds();
-  ToolBox out = all;
+Extent ToolShape::under(Vec3 normal, double height) const {
+  const Extent all = bounds();
+  Extent out = all;
   const double n[3] = {normal.x, normal.y, normal.z};
   const double slack = kSame * (std::fabs(height) + norm(all.lo) + norm(all.hi));
   double least_of[3], sum = 0;
@@ -124,12 +120,11 @@ ToolShape::Edge ToolShape::edge_of_mesh(uint32_t e) const {
 
 // All ascending, as a search through the whole mesh would list them. An edge is listed with the first of its
 // triangles, which is near wherever the edge is.
-void ToolShape::select_mesh(const ToolBox &near, bool flat) {
+void ToolShape::select_mesh(const Extent &near, bool flat) {
   mesh_->triangles_near(near.lo, near.hi, triangles_);
   std::erase_if(triangles_, [&](uint32_t t) {
     const uint32_t *const c = &surface_->tri[3 * size_t{t}];
-    const Vec3 lo = least(least(node(c[0]), node(c[1])), node(c[2]));
-    return !near.holds(lo, most(most(node(c[0]), node(c[1])), node(c[2])));
+    return !near.meets(box_of(node(c[0]), node(c[1]), node(c[2])));
   });
   near_edges_.clear();
   for (const uint32_t t : triangles_)
@@ -137,7 +132,7 @@ void ToolShape::select_mesh(const ToolBox &near, bool flat) {
       const uint32_t e = surface_->tri_edge[3 * size_t{t} + k];
       const uint32_t *const beside = &surface_->edge_tri[2 * size_t{e}];
       const uint32_t *const end = &surface_->edge[2 * size_t{e}];
-      if ((beside[0] == kNone ? beside[1] : beside[0]) == t && near.holds(node(end[0]), node(end[1])))
+      if ((beside[0] == kNone ? beside[1] : beside[0]) == t && near.meets(box_of(node(end[0]), node(end[1]))))
         near_edges_.push_back(e);
     }
   std::sort(near_edges_.begin(), near_edges_.end());
@@ -146,7 +141,7 @@ void ToolShape::select_mesh(const ToolBox &near, bool flat) {
     if (!flat && edge.flat) continue;
     edges_.push_back(edge);
     for (const uint32_t i : edge.end)
-      if (near.holds(node(i), node(i))) corners_.push_back({node(i), i});
+      if (near.meets(box_of(node(i)))) corners_.push_back({node(i), i});
   }
   std::sort(corners_.begin(), corners_.end(),
             [](const Corner &a, const Corner &b) { return a.number < b.number; });
@@ -154,7 +149,7 @@ void ToolShape::select_mesh(const ToolBox &near, bool flat) {
   corners_.erase(std::unique(corners_.begin(), corners_.end(), same), corners_.end());
 }
 
-void ToolShape::look_at(const ToolBox &near, bool flat) {
+void ToolShape::look_at(const Extent &near, bool flat) {
   corners_.clear();
   edges_.clear();
   switch (shape_.view().shape) {
@@ -187,7 +182,7 @@ void ToolShape::look_at(const ToolBox &near, bool flat) {
 }
 
 void ToolShape::select_below(Vec3 normal, double height, bool flat) {
-  look_at(shape_.view().shape == Shape::mesh ? under(normal, height) : ToolBox{}, flat);
+  look_at(shape_.view().shape == Shape::mesh ? under(normal, height) : Extent{}, flat);
 }
 
 bool ToolShape::may_meet(const Corner &corner, Vec3 n) const {

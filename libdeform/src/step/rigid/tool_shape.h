@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "geometry/obstacle_shape.h"
+#include "math/extent.h"
 #include "math/vec3.h"
 
 namespace dfm {
@@ -22,12 +23,6 @@ inline double ball_around(const ObstacleView &v) {
   if (v.shape == Shape::sphere) return v.radius;
   return v.shape == Shape::capsule ? v.radius + v.half_length : v.extent;
 }
-
-// Axis-parallel.
-struct ToolBox {
-  Vec3 lo, hi;
-  bool holds(Vec3 from, Vec3 to) const;  // whether it meets the box around these two points
-};
 
 class ToolShape {
  public:
@@ -51,11 +46,11 @@ class ToolShape {
   bool endless() const { return shape_.view().shape == Shape::plane; }
   bool has_corners() const { return !endless() && shape_.view().shape != Shape::voxels; }
   double round() const { return round_; }  // m, radius around corners and edges
-  ToolBox bounds() const;                  // not of a plane
+  Extent bounds() const;                   // not of a plane
   // Finds the corners, edges and triangles near the box; call it before the functions below. flat: also edges
   // within a face of a mesh, and corners of such edges only. Where these touch, other features touch as well,
   // unless one thing is pressed into the other, as by jaws.
-  void look_at(const ToolBox &near, bool flat);
+  void look_at(const Extent &near, bool flat);
   // The same for what lies at dot(normal, x) <= height.
   void select_below(Vec3 normal, double height, bool flat);
   struct Corner {
@@ -92,8 +87,8 @@ class ToolShape {
   bool closest(Vec3 p, double limit, ObstaclePoint &out, bool *face = nullptr) const;
 
  private:
-  void select_mesh(const ToolBox &near, bool flat);
-  ToolBox under(Vec3 normal, double height) const;
+  void select_mesh(const Extent &near, bool flat);
+  Extent under(Vec3 normal, double height) const;
   Edge edge_of_mesh(uint32_t edge) const;
   Vec3 node(uint32_t i) const { return load3(&surface_->x[4 * size_t{i}]); }
   Vec3 face_normal(uint32_t triangle) const;

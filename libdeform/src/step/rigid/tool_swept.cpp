@@ -8,6 +8,7 @@
 #include "body/obstacle_mesh.h"
 #include "ccd/toi_guard_motion.h"
 #include "dynamics/rigid/rigid_set.h"
+#include "geometry/area.h"
 #include "geometry/closest.h"
 #include "math/turn.h"
 #include "state/obstacle.h"
@@ -136,15 +137,12 @@ double ToolTouch::thickness(const Obstacle &o) {
   const dfm_obstacle_def &d = o.def;
   if (o.mesh) {
     if (!o.mesh->closed) return HUGE_VAL;
-    double volume = 0, area = 0;
-    const Surface &s = o.mesh->surface;
-    for (uint32_t t = 0; t < s.ntri; ++t) {
-      const auto at = [&](uint32_t k) { return load3(&o.mesh->local[3 * size_t{s.tri[3 * size_t{t} + k]}]); };
-      const Vec3 n = cross(at(1) - at(0), at(2) - at(0));
-      volume += dot(n, at(0)) / 6;
-      area += 0.5 * norm(n);
-    }
-    return area > 0 ? 2 * std::fabs(volume) / area : HUGE_VAL;
+    const auto at = [&](uint32_t k) { return load3(&o.mesh->local[3 * size_t{k}]); };
+    const Array<uint32_t> &tri = o.mesh->surface.tri;
+    double area = 0;
+    for (size_t t = 0; t < tri.size(); t += 3)
+      area += 0.5 * norm(cross(at(tri[t + 1]) - at(tri[t]), at(tri[t + 2]) - at(tri[t])));
+    return area > 0 ? 2 * std::fabs(signed_volume(tri, at)) / area : HUGE_VAL;
   }
   if (o.grid) return HUGE_VAL;
   if (d.shape == DFM_SHAPE_BOX) return 2 * std::min({d.half_size[0], d.half_size[1], d.half_size[2]});
@@ -177,7 +175,7 @@ double ToolTouch::meeting(const World &w, const StepContext &step, const Pair &p
 }
 
 bool ToolTouch::stays_out(World &w, StepContext &step) {
-  if (sets_.empty()) return true;
+  if (pairs_.empty()) return true;
   ways_.clear();
   turns_.clear();
   for (const auto &o : w.obstacles) {
@@ -196,7 +194,7 @@ bool ToolTouch::stays_out(World &w, StepContext &step) {
       if (far(pair)) first = std::min(first, meeting(w, step, pair, a, b));
     });
   if (!(first <= 1) || !(step.h > kMinSubstep * step.length.planned) || !may_repeat(w, step)) {
-    warn_driven(w, step);
+    warn_passing(w, step);
     return true;
   }
   step.length.repeat_grown(std::max(kMinCut, kAims * first));

@@ -327,11 +327,12 @@ bool ToolTouch::cull_facing(ToolShape &a, ToolShape &b, double far, bool flat) {
   }
   if (norm(a.position() - b.position()) - a.reach() - b.reach() > far) return false;
   const Vec3 wide = {far, far, far};
-  const ToolBox of_a = a.bounds(), of_b = b.bounds();
-  const ToolBox near = {of_b.lo - wide, of_b.hi + wide};
-  if (!near.holds(of_a.lo, of_a.hi)) return false;
-  a.look_at(near, flat);
-  b.look_at({of_a.lo - wide, of_a.hi + wide}, flat);
+  Extent of_a = a.bounds(), of_b = b.bounds();
+  if (!of_a.meets(of_b, far)) return false;
+  of_a.grow(wide);
+  of_b.grow(wide);
+  a.look_at(of_b, flat);
+  b.look_at(of_a, flat);
   return true;
 }
 
@@ -537,10 +538,9 @@ bool ToolTouch::begin(World &w, StepContext &step) {
     if (const ObstacleView &v = step.obstacle_views[i]; side_of_[i].tool != kNone)
       reach_[i] += kReach * h_ * fastest(side_of_[i], v.position, ball_around(v));
   find_near(step);
-  warn_passing(w, step);
   each_pair(w, step, [&](Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b) {
     const double deep = add_rows(pair, a, b, at_a, at_b);
-    if (!pair.jaw && inside(a, b, deep)) warn_deep(w, pair, deep, false);
+    if (!pair.jaw && inside(a, b, deep)) warn_deep(w, pair, deep);
   });
   if (rows_.empty()) return true;
   if (!follows_arcs(w, step)) return false;

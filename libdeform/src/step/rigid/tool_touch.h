@@ -109,7 +109,7 @@ class ToolTouch {
   // Two obstacles that may touch, by their places in World::obstacles.
   struct Pair {
     uint32_t a, b;
-    uint64_t id[2];
+    std::array<uint64_t, 2> id;
     uint32_t law = 0;
     bool passes = false;             // nothing keeps the two apart, and no filter excludes them
     bool frees = true, jaw = false;  // none is of a tool; one is a jaw
@@ -150,7 +150,6 @@ class ToolTouch {
     RigidSet *set;                    // nullptr: things that do not yield
     std::vector<Vec3> center, belt;   // [n] of these things; m/s
     std::vector<double> response;     // [6 bodies,6 bodies] 1/kg, of one group after another
-    std::vector<double> basis;        // scratch of clean_response()
     std::vector<size_t> first, wide;  // [groups] where it begins (kNone: none), 6 bodies
     std::vector<uint8_t> jointed;     // [groups]
     std::vector<double> free, now;    // [6n] m/s, rad/s: without contact, at the present impulses
@@ -186,7 +185,7 @@ class ToolTouch {
   void add_row(const Pair &pair, Name name, Side a, Side b, const Place &place, Vec3 normal, double gap,
                double reach);
   void find_near(const StepContext &step);
-  static uint64_t key_of(const uint64_t pair[2], Name name);
+  static uint64_t key_of(const std::array<uint64_t, 2> &pair, Name name);
   double fastest(const Side &side, Vec3 around, double reach) const;
   Vec3 center(const Side &side) const;
   void list_jaws(Moved &m, uint32_t groups);
@@ -221,7 +220,6 @@ class ToolTouch {
   bool is_driven(const Side &side, Vec3 along) const;
   void begin_passes();
   void request_again(Moved &m);
-  static void clean_response(Moved &m, uint32_t group);
   // tool_swept.cpp
   static double thickness(const Obstacle &o);
   bool goes_far_for_size(const Pair &pair) const;
@@ -229,8 +227,7 @@ class ToolTouch {
   double meeting(const World &w, const StepContext &step, const Pair &pair, ToolShape &a, ToolShape &b) const;
   // tool_warnings.cpp
   double depth(ToolShape &a, ToolShape &b, bool edges) const;
-  void warn_driven(const World &w, const StepContext &step);
-  void warn_deep(const World &w, const Pair &pair, double deep, bool driven);
+  void warn_deep(const World &w, const Pair &pair, double deep);
   void warn_passing(const World &w, const StepContext &step);
   bool reported(const Pair &pair) const;
   bool inside(const ToolShape &a, const ToolShape &b, double deep) const;

@@ -181,52 +181,54 @@ void SolveIsland::spend(uint64_t rows) { dfm::spend(*world, *step, spent, rows);
 bool SolveIsland::goes_on() { return !solve_ends(*step, spent); }
 
 SolveIslands::SolveIslands(const Memory &m) : memory_(m), joined_(m) {
-  use_memory(m, pairs_, owner_, sides_, between_rigids_, of_cuts_, order_, contact_, bond_, block_, begin_);
+  use_memory(m, owner_, sides_, between_rigids_, of_cuts_, order_, contact_, bond_, block_, begin_);
 }
 
-// Joins pairs that move the same unknown.
-void SolveIslands::join(const ContactRows &rows, std::span<ImplicitSystem *const> systems) {
-  joined_.start(static_cast<uint32_t>(pairs_.size()));
-  owner_.assign(pairs_.size() > 1 ? rows.ndof + systems.size() : 0, kNone);
-  for (uint32_t k = 0; k < pairs_.size() && !owner_.empty(); ++k) {
-    bool points = false;  // if a pair moves none, its first row is enough
+// Joins rows that move the same unknown, and those of the same two bodies.
+void SolveIslands::join(const StepContext &step) {
+  const ContactRows &rows = step.rows;
+  joined_.start(rows.all());
+  owner_.assign(rows.ndof + step.systems.size(), kNone);
+  for (uint32_t i = 0; i < rows.all(); ++i) {
     const auto move = [&](uint32_t dof) {
       const uint32_t block = rows.block[dof], s = block == kNone ? rows.source[dof] : kNone;
-      const bool implicit = s != kNone && systems[s];  // an impulse at one of its points moves all
-      points = points || (block == kNone && !implicit);
+      const bool implicit = s != kNone && step.systems[s];  // an impulse at one of its points moves all
       uint32_t &owner = owner_[implicit ? rows.ndof + s : block == kNone ? dof : rows.blocks[block].first];
-      if (owner == kNone) owner = k;
-      else if (owner != k) joined_.join(owner, k);
+      if (owner != kNone) joined_.join(owner, i);
+      owner = i;
     };
-    const RowRun run = pairs_[k].rows;
-    for (uint32_t i = run.first; i < run.first + run.n; ++i) {
-      for (uint32_t j = rows.begin[i]; j < rows.begin[i + 1]; ++j) move(rows.dof[j]);
-      for (const Array<uint32_t> *const rigid : {&rows.rigid, &rows.rigid_a})
-        if (!rigid->empty() && (*rigid)[i] != kNone) move((*rigid)[i]);
-      if (!points) break;
-    }
+    for (uint32_t j = rows.begin[i]; j < rows.begin[i + 1]; ++j) move(rows.dof[j]);
+    for (const Array<uint32_t> *const rigid : {&rows.rigid, &rows.rigid_a})
+      if (!rigid->empty() && (*rigid)[i] != kNone) move((*rigid)[i]);
   }
-  joined_.finish();
-  count_ = joined_.count;
+  const auto keep_together = [&](const auto &all, uint32_t first) {  // they are neighbors in the list
+    for (uint32_t i = 1; i < all.size(); ++i) {
+      const auto &a = all[i - 1], &b = all[i];
+      if (a.slot_a == b.slot_a && a.slot_b == b.slot_b && a.obstacle == b.obstacle)
+        joined_.join(first + i - 1, first + i);
+    }
+  };
+  keep_together(step.contacts, 0);
+  keep_together(step.bonds, rows.n);
+  count_ = joined_.number();
 }
 
 // Rigid bodies count as bodies in islands with rows between rigid things, else as obstacles.
-void SolveIslands::set_sides(const StepContext &step, uint32_t bodies, size_t of_contacts) {
+void SolveIslands::set_sides(const StepContext &step, uint32_t bodies) {
   const ContactRows &rows = step.rows;
   sides_.assign(2 * size_t{rows.n}, kNone);
   between_rigids_.assign(count_, 0);
-  for (size_t k = 0; k < of_contacts; ++k)
-    if (pairs_[k].rows.first >= rows.soft()) between_rigids_[joined_.of[k]] = 1;
-  for (size_t k = 0; k < of_contacts; ++k) {
-    const Pair &p = pairs_[k];
-    for (uint32_t i = p.rows.first; i < p.rows.first + p.rows.n; ++i) {
-      uint32_t *const side = &sides_[2 * size_t{i}];
-      side[0] = p.a;
-      side[1] = p.b;
-      if (!between_rigids_[joined_.of[k]]) continue;
-      if (rows.rigid_a[i] != kNone) side[0] = bodies + rows.rigid_a[i];
-      if (rows.rigid[i] != kNone) side[1] = bodies + rows.rigid[i];
+  for (uint32_t i = rows.soft(); i < rows.n; ++i) between_rigids_[joined_.of[i]] = 1;
+  for (uint32_t i = 0; i < rows.n; ++i) {
+    uint32_t *const side = &sides_[2 * size_t{i}];
+    if (i < rows.soft()) {
+      const ContactPoint &c = step.contacts[i];
+      side[0] = c.slot_a;
+      if (!c.obstacle) side[1] = c.slot_b;
     }
+    if (!between_rigids_[joined_.of[i]]) continue;
+    if (rows.rigid_a[i] != kNone) side[0] = bodies + rows.rigid_a[i];
+    if (rows.rigid[i] != kNone) side[1] = bodies + rows.rigid[i];
   }
 }
 
@@ -241,15 +243,16 @@ void SolveIslands::find_cuts(const World &w, const StepContext &step) {
     of_cuts_.push_back(!c.obstacle && cut(c.slot_a) && cut(c.slot_b));
 }
 
-// Contacts of the same two bodies are neighbors in the list, so most work is done once for each pair.
 void SolveIslands::find(const World &w, StepContext &step) {
-  const size_t of_contacts = find_pairs(step);
-  join(step.rows, step.systems);
-  set_sides(step, static_cast<uint32_t>(w.bodies.size()), of_contacts);
+  join(step);
+  set_sides(step, static_cast<uint32_t>(w.bodies.size()));
   find_cuts(w, step);
   while (islands_.size() < count_) islands_.emplace_back(memory_);
-  assign_rows(of_contacts);
-  sort_blocks(step.rows.blocks);
+  assign_rows(0, step.rows.n, contact_, &RowsPart::contacts, &RowsPart::n);
+  assign_rows(step.rows.n, step.rows.all(), bond_, &RowsPart::bonds, &RowsPart::nbond);
+  const Array<ContactRows::Block> &blocks = step.rows.blocks;
+  const auto of_block = [&](uint32_t b) { return joined_.of[owner_[blocks[b].first]]; };
+  list_by(count_, blocks.size(), of_block, begin_, block_);
   prepare(w, step);
   std::sort(order_.begin(), order_.end(), [&](uint32_t l, uint32_t r) {
     const uint32_t a = islands_[l].part.all(), b = islands_[r].part.all();
@@ -257,58 +260,23 @@ void SolveIslands::find(const World &w, StepContext &step) {
   });
 }
 
-size_t SolveIslands::find_pairs(const StepContext &step) {
-  pairs_.clear();
-  const auto add = [&](const auto &all, uint32_t first) {
-    for (uint32_t i = 0; i < all.size();) {
-      const auto &c = all[i];
-      const uint32_t begin = i, a = c.slot_a, b = c.slot_b, obstacle = c.obstacle;
-      while (++i < all.size() && all[i].slot_a == a && all[i].slot_b == b && all[i].obstacle == obstacle) {}
-      pairs_.push_back({a, obstacle ? kNone : b, {first + begin, i - begin}});
-    }
-  };
-  add(step.contacts, 0);
-  for (uint32_t i = step.rows.soft(); i < step.rows.n; ++i) pairs_.push_back({kNone, kNone, {i, 1}});
-  const size_t of_contacts = pairs_.size();
-  add(step.bonds, step.rows.n);
-  return of_contacts;
-}
-
-void SolveIslands::split(std::span<const Pair> pairs, Array<RowRun> &out) {
-  const auto of = [&](const Pair &p) { return joined_.of[size_t(&p - pairs_.data())]; };
+void SolveIslands::assign_rows(uint32_t from, uint32_t end, Array<RowRun> &runs,
+                               std::span<const RowRun> RowsPart::*rows, uint32_t RowsPart::*number) {
   const auto each = [&](const auto &use) {
-    for (size_t i = 0; i < pairs.size();) {
-      const uint32_t k = of(pairs[i]);
-      RowRun run = pairs[i].rows;
-      while (++i < pairs.size() && of(pairs[i]) == k) run.n += pairs[i].rows.n;
+    for (uint32_t i = from; i < end;) {
+      const uint32_t k = joined_.of[i];
+      RowRun run{i, 1};
+      while (++i < end && joined_.of[i] == k) ++run.n;
       use(k, run);
     }
   };
-  make_lists(count_, each, begin_, out);
-}
-
-void SolveIslands::assign_rows(size_t of_contacts) {
-  const auto rows_of = [](std::span<const RowRun> runs) {
-    uint32_t n = 0;
-    for (const RowRun &r : runs) n += r.n;
-    return n;
-  };
-  const auto assign = [&](std::span<const Pair> pairs, Array<RowRun> &runs, auto rows, auto number) {
-    split(pairs, runs);
-    for (uint32_t k = 0; k < count_; ++k) {
-      RowsPart &part = islands_[k].part;
-      part.*rows = slice(runs, k);
-      part.*number = rows_of(part.*rows);
-    }
-  };
-  const std::span<const Pair> all(pairs_);
-  assign(all.first(of_contacts), contact_, &RowsPart::contacts, &RowsPart::n);
-  assign(all.subspan(of_contacts), bond_, &RowsPart::bonds, &RowsPart::nbond);
-}
-
-void SolveIslands::sort_blocks(const Array<ContactRows::Block> &blocks) {
-  const auto of_block = [&](uint32_t b) { return owner_.empty() ? 0 : joined_.of[owner_[blocks[b].first]]; };
-  list_by(count_, blocks.size(), of_block, begin_, block_);
+  make_lists(count_, each, begin_, runs);
+  for (uint32_t k = 0; k < count_; ++k) {
+    RowsPart &part = islands_[k].part;
+    part.*rows = slice(runs, k);
+    part.*number = 0;
+    for (const RowRun &r : part.*rows) part.*number += r.n;
+  }
 }
 
 void SolveIslands::prepare(const World &w, StepContext &step) {

@@ -13,7 +13,7 @@
 #include "contact/solver.h"
 #include "friction/laws.h"
 #include "step/budget.h"
-#include "step/islands.h"
+#include "core/disjoint_sets.h"
 
 namespace dfm {
 
@@ -70,14 +70,9 @@ class SolveIslands {
   const uint8_t *of_cuts() const { return of_cuts_.empty() ? nullptr : of_cuts_.data(); }
 
  private:
-  struct Pair {
-    uint32_t a, b;  // b: kNone: an obstacle
-    RowRun rows;
-  };
   const Memory &memory_;
-  Array<Pair> pairs_;      // of sides that touch, or are bonded: contacts, then bonds
-  Islands joined_;         // pairs by island
-  Array<uint32_t> owner_;  // [dofs] a pair that moves it; of a block its first dof alone
+  DisjointSets joined_;    // rows by island
+  Array<uint32_t> owner_;  // [dofs] a row that moves it; of a block its first dof alone
   Array<uint32_t> sides_;
   Array<uint8_t> between_rigids_;  // [islands]
   Array<uint8_t> of_cuts_;
@@ -87,21 +82,18 @@ class SolveIslands {
   Array<uint32_t> block_, begin_;
   std::vector<SolveIsland> islands_;  // those of this sub-step come first, and stay for later ones
   uint32_t count_ = 0;
-  void join(const ContactRows &rows, std::span<ImplicitSystem *const> systems);
-  void set_sides(const StepContext &step, uint32_t bodies, size_t of_contacts);
+  void join(const StepContext &step);
+  void set_sides(const StepContext &step, uint32_t bodies);
   void find_cuts(const World &w, const StepContext &step);
-  size_t find_pairs(const StepContext &step);  // returns how many are of contacts
-  // Rows of these pairs by island.
-  void split(std::span<const Pair> pairs, Array<RowRun> &out);
   // What an island has of `all`, whose lists by island begin_ has.
   template <class T>
   std::span<const T> slice(const Array<T> &all, uint32_t island) const {
     return {all.data() + begin_[island], begin_[island + 1] - begin_[island]};
   }
-  // Each island gets its contacts and bonds.
-  void assign_rows(size_t of_contacts);
-  void sort_blocks(const Array<ContactRows::Block> &blocks);  // by island
-  void prepare(const World &w, StepContext &step);            // each island, with its blocks and laws
+  // Each island gets its rows of [from, end).
+  void assign_rows(uint32_t from, uint32_t end, Array<RowRun> &runs, std::span<const RowRun> RowsPart::*rows,
+                   uint32_t RowsPart::*number);
+  void prepare(const World &w, StepContext &step);  // each island, with its blocks and laws
 };
 
 // Of a planned sub-step: no repeated one is shorter.
