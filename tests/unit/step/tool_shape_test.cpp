@@ -12,7 +12,7 @@
 
 namespace {
 
-using dfm::ToolBox;
+using dfm::Extent;
 using dfm::ToolShape;
 using dfm::Vec3;
 
@@ -21,22 +21,21 @@ struct Everything {
   const dfm::Surface &s;
   Vec3 node(uint32_t i) const { return dfm::load3(&s.x[4 * size_t{i}]); }
   Vec3 corner(uint32_t t, size_t k) const { return node(s.tri[3 * size_t{t} + k]); }
-  bool holds(const ToolBox &near, uint32_t t) const {
-    const Vec3 a = corner(t, 0), b = corner(t, 1), c = corner(t, 2);
-    Vec3 lo = a, hi = a;
-    for (int k = 0; k < 3; ++k) {
-      lo[k] = std::min({a[k], b[k], c[k]});
-      hi[k] = std::max({a[k], b[k], c[k]});
-    }
-    return near.holds(lo, hi);
+  bool holds(const Extent &near, uint32_t t) const {
+    Extent box;
+    for (size_t k = 0; k < 3; ++k) box.add(corner(t, k));
+    return near.meets(box);
   }
   Vec3 normal(uint32_t t) const {
     return dfm::normalized(cross(corner(t, 1) - corner(t, 0), corner(t, 2) - corner(t, 0)));
   }
-  std::vector<uint32_t> edges(const ToolBox &near) const {
+  std::vector<uint32_t> edges(const Extent &near) const {
     std::vector<uint32_t> out;
-    for (uint32_t e = 0; e < s.nedge; ++e)
-      if (near.holds(node(s.edge[2 * size_t{e}]), node(s.edge[2 * size_t{e} + 1]))) out.push_back(e);
+    for (uint32_t e = 0; e < s.nedge; ++e) {
+      Extent box;
+      for (size_t k = 0; k < 2; ++k) box.add(node(s.edge[2 * size_t{e} + k]));
+      if (near.meets(box)) out.push_back(e);
+    }
     return out;
   }
   bool flat(uint32_t e) const {
@@ -57,7 +56,7 @@ struct Everything {
     }
     return sharp || leads;
   }
-  double distance2(Vec3 p, const ToolBox &near) const {
+  double distance2(Vec3 p, const Extent &near) const {
     double least = HUGE_VAL;
     for (uint32_t t = 0; t < s.ntri; ++t)
       if (holds(near, t))
@@ -106,7 +105,7 @@ class Random {
   std::mt19937 engine_{7};
 };
 
-void compare(dfm::ObstacleMesh &with, dfm::ObstacleMesh &without, const ToolBox &near, Random &random,
+void compare(dfm::ObstacleMesh &with, dfm::ObstacleMesh &without, const Extent &near, Random &random,
              size_t &found) {
   const Everything all{without.surface};
   ToolShape tree(view_of(with), &with), plain(view_of(without), &without);
@@ -128,7 +127,7 @@ void compare(dfm::ObstacleMesh &with, dfm::ObstacleMesh &without, const ToolBox 
       same_bits(e.to, f.to);
       for (int k = 0; k < 2; ++k) same_bits(e.beside[k], f.beside[k]);
       for (const uint32_t c : e.end)
-        if (near.holds(all.node(c), all.node(c))) corners.insert(c);
+        if (near.meets({all.node(c), all.node(c)})) corners.insert(c);
     }
     ASSERT_EQ(tree.corners().size(), corners.size());
     auto next = corners.begin();
