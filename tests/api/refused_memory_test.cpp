@@ -204,7 +204,6 @@ void walk_all(const Build &build, int least) {
 
 // unsanitized: too slow there; shorter tests run the same code
 TEST(RefusedMemory, InAStepWithSelfContact_LeavesTheWorldAsItWas) { walk_all(self_contact, 40); }
-// unsanitized: too slow there; shorter tests run the same code
 TEST(RefusedMemory, InAStepWithSelfContactOnAuto_LeavesTheWorldAsItWas) { walk_all(self_auto, 40); }
 TEST(RefusedMemory, InAStepThatFallsAsleepAndWakes_LeavesTheWorldAsItWas) { walk_all(sleepers, 40); }
 TEST(RefusedMemory, InAStepWithARigidHost_LeavesTheWorldAsItWas) { walk_all(rigid_host, 40); }

@@ -40,7 +40,7 @@ struct RudeHost {
   }
 };
 
-// unsanitized(implicit_m*:implicit_l*:implicit_*_ball:implicit_*_ten:s*_ten:ten_*:condensed_*:fine_*): slow
+// unsanitized(implicit_m*:implicit_l*:implicit_*_ball:implicit_*_ten:s*_ten:ten_*:condensed_*): slow
 TEST_P(Determinism, OneToEightThreads_GiveTheSameHash) {
   scenes::Scene scene = GetParam();
   // five runs, of the longest one until the ball has woken the block

@@ -349,7 +349,7 @@ TEST(BrokenLaw, ThatWaitsForEver_IsEndedWhileResultsArePrintedAsTheyCome) {
 // ---- shipped plugins --------------------------------------------------------------------------------------
 
 // unsanitized: minutes there; each plugin has tests of its own
-TEST(PluginCheck, EveryShippedPlugin_KeepsEveryRule) {
+TEST(PluginCheck, ShippedPluginsButTheReduced_KeepEveryRule) {
   int laws = 0, models = 0;
   for (const auto &entry : std::filesystem::directory_iterator(DEFORM_PLUGIN_DIR)) {
     if (entry.path().stem() == "model_gpu") continue;      // needs a driver: tests/gpu
@@ -375,7 +375,7 @@ TEST(PluginCheck, ReducedModels_KeepTheRulesOfFewBodies) {
   EXPECT_EQ(rules_that("pass", r.out).size(), 2 + 3 * 11u) << r.out;
 }
 
-// soak: a minute, and the other rules are those of ReducedModels_KeepTheRulesOfFewBodies
+// soak: a minute; the test above has the rules of few bodies
 TEST(PluginCheck, ReducedModels_KeepEveryRule) {
   const test::CommandResult r = check(shipped("model_reduced"), {}, kPatient);
   EXPECT_EQ(r.exit_code, 0) << r.out << r.err;

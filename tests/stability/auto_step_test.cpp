@@ -42,8 +42,8 @@ TEST(AutoStep, ThesisCylinderThatSpins_KeepsItsEnergy) {
 
 namespace {
 
-// By whose edges the reach of contacts is measured; kReach: m, in a step without sub-steps.
-constexpr double kStep = 1.0 / 60, kFall = 6, kReach = 2 * kFall * kStep, kLeastEdge = 0.02;
+// kReach: m, of contacts in a step without sub-steps. kLeastEdge: m, no edge is shorter.
+constexpr double kStep = 1.0 / 60, kFall = 6, kReach = 2 * kFall * kStep, kLeastEdge = 0.04;
 
 dfm_body fast_block(test::Context &context, dfm_world w, const char *model, double z, double v) {
   test::BodyOptions o;
@@ -112,5 +112,9 @@ TEST(Substeps, OfBodiesThatMeetInAStep_AreTakenFromTheFirst) {
     EXPECT_GE(substeps(0.25, kFall), 2 * n - 1) << model;
     EXPECT_EQ(substeps(0.15, -kFall), 1u) << model;
     EXPECT_EQ(substeps(1, 0), 1u) << model;
+    const dfm_world w = test::make_world(context);  // a surfel has few contacts with a simple shape
+    test::add_plane(w, "floor");
+    fast_block(context, w, model, 0.05, -kFall);
+    EXPECT_EQ(substeps_of_step(w), 1u) << model;
   }
 }

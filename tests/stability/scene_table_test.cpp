@@ -1,4 +1,4 @@
-// Every shipped scene: its least contact count, ten jittered runs (three of them in `make test`), and a
+// Every shipped scene: its least contact count, ten jittered runs (of most, three in `make test`), and a
 // mutation (contact off) that the judgment of its runs must not survive. What else a scene is for, and the
 // mutations of that (friction off, moduli swapped), stand in its own test beside this one.
 #include <fstream>

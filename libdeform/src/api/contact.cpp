@@ -65,8 +65,9 @@ std::string side(World &w, const char *text, bool grouped) {
     return found;
   }
   const std::vector<std::string> given(names.begin() + 1, names.end());  // "*" is near any short name
-  fail(DFM_E_ARG, "'%s' is not a body, obstacle or material of this world%s; known: %s", text,
-       did_you_mean(s, given, '\'').c_str(), join(names).c_str());
+  const std::string near = did_you_mean(s, given, '\'');
+  fail(DFM_E_ARG, "'%s' is not a body, obstacle or material of this world%s", text,
+       near.empty() ? ("; known: " + join(names)).c_str() : near.c_str());
 }
 
 // Seen from the other side the normal and the first tangent are the opposite ones, and the second tangent,

@@ -21,7 +21,7 @@ dfm_params params_of(const dfm_params *given) {
 Switch make_switch(const Body &b, const dfm_switch &s, double after) {
   need(s.type, "type");
   if (!std::isfinite(s.t) || s.t < after)
-    refuse(b, ": a switch at %g s; times must be finite and must not decrease", s.t);
+    refuse(b, ": a switch at %g s after one at %g s; times must be finite and must not decrease", s.t, after);
   Switch out{s.t, choose_model(b, s.type, s.params, s.integrator)};
   if (!(s.max_jump >= 0)) refuse(b, ": max_jump is %g J; it must be above 0, or 0 for any jump", s.max_jump);
   if (s.max_jump > 0) out.to.max_jump = s.max_jump;

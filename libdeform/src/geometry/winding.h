@@ -12,7 +12,7 @@ namespace dfm {
 
 // A tree is used from a distance of kFarWinding radii of a box; nearer, its triangles' solid angles are
 // summed exactly. The error of the sum is below 0.05 on every surface measured
-// (tests/unit/mesh/winding_test.cpp), where the decision at 1/2 needs less than 1/4.
+// (tests/unit/geometry/winding_test.cpp), where the decision at 1/2 needs less than 1/4.
 inline constexpr double kFarWinding = 2.5;
 
 class WindingTree {

@@ -369,12 +369,16 @@ void read_materials(const Node &scene, Definition &def, ReadContext &context) {
   }
 }
 
-// The world knows the sides: groups of a surface are there once the body is.
-void read_between(const Node &entry, std::string out[2]) {
+// The world knows materials, and groups of a surface once the body is there.
+void read_between(const Node &entry, const ReadContext &context, std::string out[2]) {
   const Node between = entry.at("between");
   const std::vector<Node> sides = between.items();
   if (sides.size() != 2) between.fail("expected two sides [a, b], found %zu", sides.size());
-  for (int i = 0; i < 2; ++i) out[i] = sides[i].text();
+  for (int i = 0; i < 2; ++i) {
+    out[i] = sides[i].text();
+    if (out[i] != "*" && out[i].find_first_of(":=") == std::string::npos)
+      known(sides[i], context.sides, "body or obstacle");
+  }
 }
 
 void read_contact(const Node &scene, Definition &def, const ReadContext &context) {
@@ -418,7 +422,7 @@ void read_contact(const Node &scene, Definition &def, const ReadContext &context
     entry.object("friction");
     Friction f;
     f.pointer = entry.pointer();
-    read_between(entry, f.between);
+    read_between(entry, context, f.between);
     const dfm_type *type = read_type(entry.at("law"), DFM_KIND_FRICTION, context.types);
     f.law = type->id;
     if (entry.has("params")) f.params = read_params(entry.member("params"), type);
@@ -432,7 +436,7 @@ void read_contact(const Node &scene, Definition &def, const ReadContext &context
     entry.object("filter");
     Filter f;
     f.pointer = entry.pointer();
-    read_between(entry, f.between);
+    read_between(entry, context, f.between);
     f.collide = entry.boolean("collide", false);
     def.filters.push_back(std::move(f));
   }

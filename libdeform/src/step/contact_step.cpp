@@ -26,7 +26,14 @@ Motion motion_of(const Body &b) {
   return m;
 }
 
-Motion motion_of(const World &w, const ObstacleView &v) {
+double speed_of(const Extent &velocity) {  // m/s, at most
+  Vec3 fastest;
+  for (int k = 0; k < 3; ++k) fastest[k] = std::max(-velocity.lo[k], velocity.hi[k]);
+  return norm(fastest);
+}
+
+// m/s, of the points of a mesh that are within `place`.
+Extent velocity_of(const World &w, const ObstacleView &v, const Extent &place) {
   const Obstacle &o = *w.obstacles[v.slot];
   Vec3 velocity = v.velocity, spin = v.spin;
   if (is_moved(o)) {
@@ -34,56 +41,83 @@ Motion motion_of(const World &w, const ObstacleView &v) {
     spin = load3(s.spin);
     velocity = load3(s.velocity) + cross(spin, v.position - load3(s.position));
   }
-  const Extent &place = o.mesh->bounds();
-  Motion m{place, {}, o.mesh->surface.median_edge};
+  Extent out;
   for (int corner = 0; corner < 8; ++corner) {
     Vec3 p;
     for (int k = 0; k < 3; ++k) p[k] = corner >> k & 1 ? place.hi[k] : place.lo[k];
-    m.velocity.add(velocity + cross(spin, p - v.position));
+    out.add(velocity + cross(spin, p - v.position));
   }
-  return m;
+  return out;
 }
 
-// 1/s: how many edges the reach grows by in a second, of two that meet within dt; otherwise 0.
-double rate(const Motion &a, const Motion &b, double offset, double dt) {
-  Vec3 fastest;
-  for (int k = 0; k < 3; ++k) {
-    const double low = a.velocity.lo[k] - b.velocity.hi[k], high = a.velocity.hi[k] - b.velocity.lo[k];
-    if (a.place.lo[k] + std::min(low, 0.0) * dt > b.place.hi[k] + offset) return 0;
-    if (a.place.hi[k] + std::max(high, 0.0) * dt < b.place.lo[k] - offset) return 0;
-    fastest[k] = std::max(-low, high);
-  }
-  const double edge = std::min(a.edge, b.edge);
-  return edge > 0 ? contact_reach(1, 0, norm(fastest)) / edge : 0;
+// Of `a` as seen from what has these velocities.
+Extent relative(const Motion &a, const Extent &velocity) {
+  return {a.velocity.lo - velocity.hi, a.velocity.hi - velocity.lo};
+}
+
+// m, the places that it comes to within dt, seen so, and d_c around them.
+Extent swept(const Motion &a, const Extent &velocity, double dt, double offset) {
+  Extent out = a.place;
+  out.add(out.lo + dt * velocity.lo);
+  out.add(out.hi + dt * velocity.hi);
+  out.grow({offset, offset, offset});
+  return out;
+}
+
+// 1/s: how many of these edges the reach grows by in a second.
+double rate(const Extent &velocity, double edge) {
+  return edge > 0 ? contact_reach(1, 0, speed_of(velocity)) / edge : 0;
 }
 
 }  // namespace
 
 double contact_step(World &w, StepContext &step, double dt) {
-  if (std::isfinite(w.bound.step)) return HUGE_VAL;
+  if (std::isfinite(w.bound.step) || w.prescribed.is_static()) return HUGE_VAL;
   step.rest = step.h = step.left = dt;
   view_obstacles(w, step);
-  const auto moves = [&](const ObstacleView &o) {
-    return o.shape == Shape::mesh &&
-           (is_moved(*w.obstacles[o.slot]) || norm2(o.velocity) + norm2(o.spin) > 0);
-  };
-  if (w.sleepers == w.bodies.size() && std::ranges::none_of(step.obstacle_views, moves)) return HUGE_VAL;
-  step.spans.clear();
-  for (const auto &b : w.bodies) step.spans.push_back(motion_of(*b));
-  double most = 0;
-  const auto meet = [&](const auto &a, const auto &b, const Motion &other) {
-    const double needed = rate(step.spans[a.slot], other, w.offset, dt);
-    if (needed > most && w.pairs.filter.may_touch(a, b)) most = needed;
-  };
-  for (const BodyView &a : step.body_views)
-    for (const BodyView &b : step.body_views)
-      if (a.slot < b.slot) meet(a, b, step.spans[b.slot]);
+  const auto add = [&](uint32_t slot) { step.spans[slot] = motion_of(*w.bodies[slot]); };
+  step.spans.resize(w.bodies.size());
+  double fastest = 0, edge = HUGE_VAL;
+  for (uint32_t i = 0; i < w.bodies.size(); ++i) {
+    edge = std::min(edge, w.bodies[i]->surface.median_edge);
+    if (w.bodies[i]->sleep_state.asleep) continue;
+    add(i);
+    fastest = std::max(fastest, speed_of(step.spans[i].velocity));
+  }
   for (const ObstacleView &o : step.obstacle_views) {
     if (o.shape != Shape::mesh) continue;
-    const Motion motion = motion_of(w, o);
-    for (const BodyView &a : step.body_views) meet(a, o, motion);
+    ObstacleMesh &mesh = *w.obstacles[o.slot]->mesh;
+    edge = std::min(edge, mesh.surface.median_edge);
+    fastest = std::max(fastest, speed_of(velocity_of(w, o, mesh.bounds())));
   }
-  return most > 0 ? 1 / most : HUGE_VAL;
+  if (!(contact_reach(dt, 0, 2 * fastest) > edge)) return HUGE_VAL;
+  for (uint32_t i = 0; i < w.bodies.size(); ++i)
+    if (w.bodies[i]->sleep_state.asleep) add(i);
+  double most = 1 / dt;  // what is slower needs no look
+  for (const BodyView &va : step.body_views) {
+    const Motion &a = step.spans[va.slot];
+    for (const BodyView &vb : step.body_views) {
+      if (!(va.slot < vb.slot)) continue;
+      const Motion &b = step.spans[vb.slot];
+      const Extent velocity = relative(a, b.velocity);
+      const double needed = rate(velocity, std::min(a.edge, b.edge));
+      if (needed > most && swept(a, velocity, dt, w.offset).meets(b.place) &&
+          w.pairs.filter.may_touch(va, vb))
+        most = needed;
+    }
+    for (const ObstacleView &o : step.obstacle_views) {
+      if (o.shape != Shape::mesh) continue;
+      ObstacleMesh &mesh = *w.obstacles[o.slot]->mesh;
+      const Extent velocity = relative(a, velocity_of(w, o, a.place));
+      const double needed = rate(velocity, std::min(a.edge, mesh.surface.median_edge));
+      if (!(needed > most && w.pairs.filter.may_touch(va, o))) continue;
+      if (!mesh.tree) mesh.make_tree(w.meters.obstacles.memory());
+      const Extent place = swept(a, velocity, dt, w.offset);
+      mesh.triangles_near(place.lo, place.hi, step.triangles);
+      if (!step.triangles.empty()) most = needed;
+    }
+  }
+  return 1 / most;
 }
 
 }  // namespace dfm

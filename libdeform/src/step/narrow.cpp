@@ -53,6 +53,7 @@ Next stage_narrow(World &w, StepContext &step, uint32_t *) {
   find_contacts(step.body_views, step.obstacle_views, step.broad.candidates(), step.h, w.offset,
                 w.store.crossings, step.lent, step.contacts, &step.narrow, &w.context->tasks,
                 known ? &step.guard.memory : nullptr);
+  for (const uint32_t i : step.active) step.body_views[i].speed = -1;
   drop_false_depths(w, step);
   step.woken.clear();
   if (w.sleepers == 0) return Next::stage;
