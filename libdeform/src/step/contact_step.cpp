@@ -6,6 +6,7 @@
 #include "body/obstacle_mesh.h"
 #include "contact/reach.h"
 #include "dynamics/rigid/rigid_set.h"
+#include "state/obstacle.h"
 #include "state/world.h"
 #include "step/context.h"
 #include "step/move_obstacles.h"
