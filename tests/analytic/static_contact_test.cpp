@@ -5,6 +5,7 @@
 
 #include "cells.h"
 #include "contact_elastic.h"
+#include "obstacle.h"
 #include "support.h"
 
 namespace {
@@ -335,30 +336,34 @@ TEST(StaticContact, SpringAndFloor_ShareTheWeight) {
   dfm_world_destroy(w);
 }
 
-// What moves carries what rests on it, however fast: only the way counts.
+// What moves carries what rests on it, however fast: only the way counts, and no time passes that a step of
+// the search could divide.
 TEST(StaticContact, TrayThatMoves_CarriesTheCube) {
-  for (const uint32_t load_steps : {1u, 4u}) {
-    test::Context context;
-    const dfm_world w = offset_world(context, {0, 0, -kG});
-    const dfm_body b = make_cube(context, w, cube("cube", 1e5, kOffset));
-    dfm_pose_key keys[2] = {};
-    for (dfm_pose_key &key : keys) key.pose = {{0, 0, -0.1}, {0, 0, 0, 1}};
-    keys[1].t = 1;
-    keys[1].pose.position[0] = 1.5;
-    dfm_obstacle_def d = dfm_obstacle_def_default();
-    d.shape = DFM_SHAPE_BOX;
-    d.half_size[0] = d.half_size[1] = 0.5;
-    d.half_size[2] = 0.1;
-    d.nkey = 2;
-    d.keys = keys;
-    dfm_obstacle tray = 0;
-    test::ok(dfm_obstacle_create(w, &d, &tray));
-    test::set_friction(w, 0.8);
-    const double before = test::measure(b).com[0];
-    test::ok(find(w, 1, load_steps));
-    EXPECT_NEAR(test::measure(b).com[0] - before, 1.5, 2e-4) << load_steps << " load steps";
-    dfm_world_destroy(w);
-  }
+  const test::Triangles triangles = test::box_surface({0.5, 0.5, 0.1}, 10);
+  for (const bool mesh : {false, true})
+    for (const uint32_t load_steps : {1u, 4u}) {
+      SCOPED_TRACE(testing::Message() << (mesh ? "mesh, " : "box, ") << load_steps << " load steps");
+      test::Context context;
+      const dfm_world w = offset_world(context, {0, 0, -kG});
+      const dfm_body b = make_cube(context, w, cube("cube", 1e5, kOffset));
+      dfm_pose_key keys[2] = {};
+      for (dfm_pose_key &key : keys) key.pose = {{0, 0, -0.1}, {0, 0, 0, 1}};
+      keys[1].t = 1;
+      keys[1].pose.position[0] = 1.5;
+      dfm_obstacle_def d = mesh ? test::mesh_def("tray", triangles) : dfm_obstacle_def_default();
+      if (!mesh) d.shape = DFM_SHAPE_BOX;
+      d.half_size[0] = d.half_size[1] = 0.5;
+      d.half_size[2] = 0.1;
+      d.nkey = 2;
+      d.keys = keys;
+      dfm_obstacle tray = 0;
+      test::ok(dfm_obstacle_create(w, &d, &tray));
+      test::set_friction(w, 0.8);
+      const double before = test::measure(b).com[0];
+      test::ok(find(w, 1, load_steps));
+      EXPECT_NEAR(test::measure(b).com[0] - before, 1.5, 2e-4);
+      dfm_world_destroy(w);
+    }
 }
 
 // The foot of the sphere on a face moves by more than the corner that gives way under it. Without friction

@@ -72,7 +72,7 @@ class ShippedScene : public testing::TestWithParam<const char *> {};
 // Before the first step the two worlds have the same hash, and so they have after ten; in the middle of a
 // run a snapshot makes them so, and without one they stay together as far as contacts and dampers remember.
 // Models that move a body as a whole need the snapshot.
-// unsanitized(c*:f*:g*:l*:o*:p*:r*:t*): too slow there; the other scenes run the same code
+// unsanitized(c*:f*:g*:l*:o*:p*:r*:t*): too slow there; tests below write tools, rigid bodies, pieces
 TEST_P(ShippedScene, WrittenAndLoaded_IsTheSameWorld) {
   test::Context context;
   const std::string name = GetParam(), folder = folder_of(name);

@@ -28,7 +28,7 @@ void expect_at_rest(const Case &c) {
 
 }  // namespace
 
-// soak(karnopp:elastoplastic): the sets of coulomb and the bristles of lugre; cover_test has each law
+// soak(karnopp:elastoplastic): one sticks as coulomb does, one has the bristles of lugre; cover_test has each
 TEST_P(Hold, OnASlopeAndPulled_DoesNotCreep) {
   for (const double level : {0.5, 0.9, 0.99}) expect_held({"slope", GetParam(), level, 1e-3, false});
   expect_held({"pull", GetParam(), 0.99, 1.0 / 60, false});

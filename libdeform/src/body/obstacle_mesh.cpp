@@ -124,7 +124,7 @@ uint64_t ObstacleMesh::triangles_near(Vec3 lo, Vec3 hi, std::vector<uint32_t> &o
   return looks;
 }
 
-const ObstacleMesh::Bounds &ObstacleMesh::bounds() {
+const Extent &ObstacleMesh::bounds() {
   if (!bounded_) bounds_ = extent_of(surface.x.data(), surface.nsurfel, 4);
   bounded_ = true;
   return bounds_;

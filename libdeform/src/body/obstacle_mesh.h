@@ -37,11 +37,10 @@ struct ObstacleMesh {
   // parallel to the axes of the world. Returns how many boxes of the tree it has looked at.
   uint64_t triangles_near(Vec3 lo, Vec3 hi, std::vector<uint32_t> &out) const;
   // Of x, axis-parallel; computed once in each place.
-  using Bounds = Extent;
-  const Bounds &bounds();
+  const Extent &bounds();
 
  private:
-  Bounds bounds_;
+  Extent bounds_;
   bool bounded_ = false;  // bounds_ are those of x
 };
 

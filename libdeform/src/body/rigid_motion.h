@@ -9,7 +9,7 @@ namespace dfm {
 struct RigidMotion {
   Vec3 center, velocity, spin;  // m, m/s of the center of mass, rad/s
   double mass = 0;              // kg
-  Vec3 turns[3];                // 1/(kg m2), columns of the inverse inertia; zero without a spin
+  Vec3 turns[3] = {};           // 1/(kg m2), columns of the inverse inertia; zero without a spin
   Vec3 at(Vec3 x) const { return velocity + cross(spin, x - center); }
   // 1/kg, what a unit impulse along n at x changes of the velocity there along n
   double response(Vec3 x, Vec3 n) const {

@@ -88,22 +88,6 @@ void keep_params(Body &b, const BodyShape &before) {
   b.model.params = values;
 }
 
-// Puts the shape into the body; the last steps may fail, which undoes it.
-template <class Finish>
-std::unique_ptr<BodyShape> put(Body &b, std::unique_ptr<BodyShape> shape, Finish &&finish) {
-  shape->shape = ++b.world->shapes;
-  shape->search = std::make_unique<SearchTree>(b.world->memory());
-  exchange(b, *shape);
-  try {
-    weigh(b);
-    finish(*shape);
-  } catch (...) {
-    exchange(b, *shape);
-    throw;
-  }
-  return shape;
-}
-
 }  // namespace
 
 void exchange(Body &b, BodyShape &other) noexcept {
@@ -348,12 +332,20 @@ std::unique_ptr<BodyShape> restore_shape(Body &b, const Body &like, std::shared_
     out.zones = whole->zones;
   }
   gather_surface(out.surface, out.p.x.data(), out.p.v.data());
-  return put(b, std::move(shape), [&](const BodyShape &had) {
-    const BodyShape &before = &like == &b ? had : like;
+  out.shape = ++b.world->shapes;
+  out.search = std::make_unique<SearchTree>(m);
+  exchange(b, out);
+  try {
+    weigh(b);
+    const BodyShape &before = &like == &b ? out : static_cast<const BodyShape &>(like);
     b.model.type = before.model.type;
     b.origin = before.origin;
     b.origin.held.assign(b.p.n, 0);
-  });
+  } catch (...) {
+    exchange(b, out);
+    throw;
+  }
+  return shape;
 }
 
 }  // namespace dfm

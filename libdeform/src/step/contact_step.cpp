@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "body/obstacle_mesh.h"
+#include "body/rigid_motion.h"
 #include "contact/reach.h"
 #include "dynamics/rigid/rigid_set.h"
 #include "state/obstacle.h"
@@ -36,17 +37,16 @@ double speed_of(const Extent &velocity) {  // m/s, at most
 // m/s, of the points of a mesh that are within `place`.
 Extent velocity_of(const World &w, const ObstacleView &v, const Extent &place) {
   const Obstacle &o = *w.obstacles[v.slot];
-  Vec3 velocity = v.velocity, spin = v.spin;
+  RigidMotion motion{v.position, v.velocity, v.spin};
   if (is_moved(o)) {
     const dfm_rigid_state &s = o.rigid->state[o.rigid_body];
-    spin = load3(s.spin);
-    velocity = load3(s.velocity) + cross(spin, v.position - load3(s.position));
+    motion = RigidMotion{load3(s.position), load3(s.velocity), load3(s.spin)};
   }
   Extent out;
   for (int corner = 0; corner < 8; ++corner) {
     Vec3 p;
     for (int k = 0; k < 3; ++k) p[k] = corner >> k & 1 ? place.hi[k] : place.lo[k];
-    out.add(velocity + cross(spin, p - v.position));
+    out.add(motion.at(p));
   }
   return out;
 }
@@ -76,14 +76,14 @@ double contact_step(World &w, StepContext &step, double dt) {
   if (std::isfinite(w.bound.step) || w.prescribed.is_static()) return HUGE_VAL;
   step.rest = step.h = step.left = dt;
   view_obstacles(w, step);
-  const auto add = [&](uint32_t slot) { step.spans[slot] = motion_of(*w.bodies[slot]); };
-  step.spans.resize(w.bodies.size());
+  const auto add = [&](uint32_t slot) { step.surface_motions[slot] = motion_of(*w.bodies[slot]); };
+  step.surface_motions.resize(w.bodies.size());
   double fastest = 0, edge = HUGE_VAL;
   for (uint32_t i = 0; i < w.bodies.size(); ++i) {
     edge = std::min(edge, w.bodies[i]->surface.median_edge);
     if (w.bodies[i]->sleep_state.asleep) continue;
     add(i);
-    fastest = std::max(fastest, speed_of(step.spans[i].velocity));
+    fastest = std::max(fastest, speed_of(step.surface_motions[i].velocity));
   }
   for (const ObstacleView &o : step.obstacle_views) {
     if (o.shape != Shape::mesh) continue;
@@ -96,10 +96,10 @@ double contact_step(World &w, StepContext &step, double dt) {
     if (w.bodies[i]->sleep_state.asleep) add(i);
   double most = 1 / dt;  // what is slower needs no look
   for (const BodyView &va : step.body_views) {
-    const Motion &a = step.spans[va.slot];
+    const Motion &a = step.surface_motions[va.slot];
     for (const BodyView &vb : step.body_views) {
       if (!(va.slot < vb.slot)) continue;
-      const Motion &b = step.spans[vb.slot];
+      const Motion &b = step.surface_motions[vb.slot];
       const Extent velocity = relative(a, b.velocity);
       const double needed = rate(velocity, std::min(a.edge, b.edge));
       if (needed > most && swept(a, velocity, dt, w.offset).meets(b.place) &&

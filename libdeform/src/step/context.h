@@ -71,8 +71,8 @@ struct StepContext {
     Extent place, velocity;  // m, m/s, of its surfels
     double edge;             // m
   };
-  std::vector<Motion> spans;        // [bodies] of contact_step()
-  std::vector<uint32_t> triangles;  // near one of them
+  std::vector<Motion> surface_motions;  // [bodies] of contact_step()
+  std::vector<uint32_t> triangles;      // near one of them
   Array<Driven> driven;
   // predict
   Array<double> free_kinetic;  // [bodies] J, without contact; of this sub-step

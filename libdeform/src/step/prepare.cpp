@@ -490,7 +490,7 @@ void prepare(World &w, const RestoredChoice *restored) {
   for (auto &b : w.bodies)
     if (w.def.sleep && b->anchor.empty()) b->anchor = b->p.x;
   step.active.reserve(nb);
-  step.spans.reserve(nb);
+  step.surface_motions.reserve(nb);
   step.sinks.reserve(nb);
   reserve_sleep(w, step, nb);
   if (w.sleepers > 0 && w.offset != unplanned.offset)

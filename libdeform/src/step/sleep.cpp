@@ -91,6 +91,7 @@ void gather_active(World &w) {
   for (uint32_t i = 0; i < w.bodies.size(); ++i) {
     Body &b = *w.bodies[i];
     step.body_views[i].asleep = b.sleep_state.asleep;
+    step.body_views[i].speed = b.sleep_state.asleep ? 0 : -1;
     if (b.sleep_state.asleep) continue;
     step.active.push_back(i);
     step.sinks.push_back({step.body_views[i].first_node, b.surface.nsurfel, b.p.n, &b.surface,
