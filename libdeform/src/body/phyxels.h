@@ -27,6 +27,7 @@ struct Phyxels {
   Array<double> x_end, v_end;  // [n,4] m, m/s: end of the sub-step with contact
   Array<double> f;             // [n,4] N: loads and the model's forces
   Array<double> load;          // [n,4] N: sum of lasting loads at the current time
+  Array<double> load_before;   // [n,4] N: at the start of the sub-step; empty unless dynamics ask for it
   Array<double> impulse;       // [n,4] N s: contact impulses of the sub-step, J^T lambda
   Array<double> mass;          // [n] kg, lumped
   double least_mass = 0;       // kg

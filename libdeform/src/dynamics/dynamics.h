@@ -2,10 +2,9 @@
 // integrators are known in this folder only.
 //
 //   bound         between sub-steps: the largest stable one at the present state
-//   begin         of a sub-step: whether contacts are expected
+//   choose_scheme of a sub-step: whether contacts are expected, and again where they are known
 //   add_forces    forces that follow from the state
 //   free_motion   the mean velocity over the sub-step without contact
-//   take_contact  contacts are known: is the free motion one that goes with them?
 //   unknowns      that velocity, and what an impulse changes of it where points do not answer each other's
 //                 impulses; or the equations of motion of its points, which the solve of contact solves
 //                 together with it; else
@@ -15,9 +14,11 @@
 //
 // Why contact sees no more of a body: doc/decisions/structure.md.
 #pragma once
+#include <atomic>
 #include <functional>
 #include <limits>
 #include <memory>
+#include <mutex>
 #include <string>
 
 #include "body/phyxels.h"
@@ -97,7 +98,7 @@ struct Abilities {
   bool accurate = false;  // accurate_step() is known
   bool energy = false;    // the energy that its scheme conserves is known (step/watch/energy_watch.h)
   bool damps = false;     // its scheme conserves no energy: it dissipates
-  bool parts = false;     // its free motion depends on whether there are contacts: begin(), take_contact()
+  bool parts = false;     // its free motion depends on whether there are contacts: choose_scheme()
   bool late = false;      // steps leave out points: see_points()
   // DFM_CAP_* that the model must keep with any parameters, because these dynamics need them.
   uint32_t claims = 0;
@@ -110,7 +111,7 @@ class Dynamics {
   Dynamics(const Dynamics &) = delete;
   virtual ~Dynamics() = default;
 
-  virtual Abilities abilities() const = 0;
+  const Abilities &abilities() const { return abilities_; }
 
   // spectrum: share is wanted, too. The lag is points().dampers.lag from the next bound() on.
   // placed: of the rest positions that the model was made with.
@@ -121,31 +122,25 @@ class Dynamics {
   virtual bool bound(double time, double share, const AddRowSums &outside, StepBound &out) = 0;
   // s, the longest sub-step with contacts, at the last bound; infinite: any.
   virtual double contact_step() { return std::numeric_limits<double>::infinity(); }
-  // touched: the last sub-step ended with contacts. Called once for a sub-step and its repetitions.
-  virtual void begin(bool) {}
-  // The present loads are those at the start of the sub-step; those at its end follow. Not called if loads do
-  // not vary.
-  virtual void loads_before() {}
-  // Called if there are contacts. Returns false if the sub-step must be repeated with the scheme for contact.
-  virtual bool take_contact() { return true; }
+  // Called once for a sub-step and its repetitions (touched: the last one ended with contacts), and once
+  // there are contacts. Returns false if the scheme is another one than before: free_motion() must run again.
+  virtual bool choose_scheme(bool /*touched*/) { return true; }
   // Return false if the model fails, or (free_motion) a velocity is not finite or above `fastest`. kinetic:
   // J, of the free motion; unchanged if it is not known.
   // keep: points().f holds the forces until commit(); else they may be used up as they come.
   virtual bool add_forces(const SubStep &, bool /*keep*/) { return true; }
   virtual bool free_motion(const SubStep &now, double &kinetic) = 0;
 
-  virtual Unknowns unknowns() = 0;
+  Unknowns unknowns() const;
   // Where the unknowns are surfels: the response of n distinct ones to impulses at them, [3n,3n] 1/kg: one
   // column per unit impulse; symmetric up to rounding. Returns false if the model fails.
   virtual bool response(const SubStep &, uint32_t, const uint32_t *, double *) { return false; }
 
   // Takes the impulses in points().impulse, or at the surfels [nsurfel,3] if points respond to each other.
-  // touched: there are impulses. Returns false if the model fails, or the end is not finite.
+  // touched: there are impulses; else the unknowns have the velocity without contact again, which a further
+  // solve needs. Returns false if the model fails, or the end is not finite.
   virtual bool end_state(const SubStep &now, const double *surfel_impulse, bool touched) = 0;
-  virtual EndState end() const = 0;
-  // The unknowns have the velocity without contact again, before a further solve: end_state() may have put
-  // the end in its place.
-  virtual void free_again(const SubStep &) {}
+  EndState end() const { return end_; }
   // s, the sub-step that would have the wanted error, estimated from the error of this one; infinite: not
   // known. After end_state().
   virtual double accurate_step(const SubStep &) const { return std::numeric_limits<double>::infinity(); }
@@ -160,27 +155,35 @@ class Dynamics {
   // J, stored in dampers that see the velocity with a lag
   virtual double damper_energy(double /*time*/) { return 0; }
   virtual void commit(const SubStep &now) = 0;
-  // After commit(): takes c M^-1 K v from the velocities, c in s2, K the stiffness of the model, which is
-  // taken as constant over `ahead` (s) of the motion. Momentum and angular momentum stay.
-  virtual void damp(double /*time*/, double /*c*/, double /*ahead*/) {}
+  // After commit(), of points with a `diagonal`: takes c M^-1 K v from the velocities, c in s2, K the
+  // stiffness of the model, taken as constant over `ahead` (s) of the motion. Both momenta stay.
+  void damp(double time, double c, double ahead);
 
   // Computes the points that steps may leave out because no surfel depends on them. Call before reading
   // points. Between steps, any thread.
-  virtual void see_points() {}
+  void see_points();
   // Call after points have been written; all of them must have been computed before.
-  virtual void points_changed() {}
+  void points_changed();
   // Returns false if the sums are not known without see_points(). Also valid between free_motion() and
   // end_state().
   virtual bool sums(BodySums &) const { return false; }
 
   // trial: with memory for the next state of the model
-  virtual dfm_kin kin(double time, double h, bool trial = false) const;
+  dfm_kin kin(double time, double h, bool trial = false) const;
   void push(uint32_t point, double weight, const double *impulse);  // N s, between sub-steps
 
  protected:
   Phyxels &p_;
   Surface &surface_;
   ModelInstance &model_;
+  Abilities abilities_;
+  EndState end_{};
+  ImplicitSystem *system_ = nullptr;  // of points that move implicitly
+  double least_h_ = 0;                // s, that kin() gives to the model
+  std::atomic<bool> unseen_ = false;  // points have been left out since see_points()
+
+ private:
+  std::mutex seeing_;
 };
 
 // Makes the dynamics of a body with this model. edges: [nedge,2] of its mesh. implicit: null if the library

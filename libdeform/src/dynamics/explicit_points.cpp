@@ -4,7 +4,6 @@
 #include <cmath>
 #include <numeric>
 
-#include "body/rigid_motion.h"
 #include "dynamics/mass_scaling.h"
 #include "dynamics/symplectic_euler.h"
 #include "math/lanczos.h"
@@ -41,6 +40,7 @@ ExplicitPoints::ExplicitPoints(const Memory &memory, Phyxels &points, Surface &s
       loops_(points_kernels()),
       stiffness_(points.n, 0.0, memory),
       damping_(points.n, 0.0, memory) {
+  abilities_ = {.forces = true, .springs = true, .placed = true, .energy = true};
   use_memory(memory, part_kinetic_, reached_, before_, lagged_, drag_, load_);
   if (model.part_forces)  // after a failure: none, and forces come for all points at once
     part_kinetic_.resize(model.ask("parts", [&] { return model.part_forces->parts(model.self); }));
@@ -333,6 +333,7 @@ bool ExplicitPoints::free_motion(const SubStep &now, double &kinetic) {
 bool ExplicitPoints::end_state(const SubStep &now, const double *surfel_impulse, bool touched) {
   free_again(now);
   in_place_ = !touched || surface_.identity();
+  end_.v = end_.mean = (in_place_ ? p_.v_free : p_.v_end).data();
   if (!in_place_) {
     loops_.end(p_.n, now.h, p_.x.data(), p_.v_free.data(), p_.inv_mass.data(),
                touched ? p_.impulse.data() : nullptr, p_.x_end.data(), p_.v_end.data());
@@ -414,39 +415,6 @@ double ExplicitPoints::damper_energy(double time) {
       sum += (*u)[at] * (0.5 * f[at] - drag(uint32_t(at / kStride)) * (*u)[at]);
   }
   return 0.5 * p_.dampers.lag * sum;
-}
-
-// K v = (f(x - e v) - f(x + e v)) / 2 e, v the velocity less the rigid motion: that strains nothing, but in a
-// strained body it would seem to. f, x_end and v_end are free until the next sub-step.
-void ExplicitPoints::damp(double time, double c, double ahead) {
-  const auto place = [&](uint32_t i) { return load3(&p_.x[size_t(i) * kStride]); };
-  const bool held = p_.held_anywhere() != 0;
-  const auto rigid_part = [&](const Array<double> &v) {
-    return held ? RigidMotion{} : rigid_motion(p_.n, p_.mass.data(), place, [&](uint32_t i) {
-      return load3(&v[size_t(i) * kStride]);
-    });
-  };
-  const auto forces_along = [&](double e, const RigidMotion &rigid, Array<double> &f) {
-    for (uint32_t i = 0; i < p_.n; ++i) {
-      const size_t at = size_t(i) * kStride;
-      store3(&p_.x_end[at], place(i) + e * (load3(&p_.v[at]) - rigid.at(place(i))));
-    }
-    std::fill(f.begin(), f.end(), 0.0);
-    dfm_kin k = kin(time, 0);
-    k.x = p_.x_end.data();
-    return model_.add_forces(k, f.data()) == DFM_OK;
-  };
-  const RigidMotion rigid = rigid_part(p_.v);
-  if (!forces_along(ahead, rigid, p_.f) || !forces_along(-ahead, rigid, p_.v_end))
-    return;  // the next call tells
-  Array<double> &change = p_.f;
-  for (size_t at = 0; at < change.size(); ++at)
-    change[at] = p_.inv_mass[at] * (c / (2 * ahead)) * (p_.f[at] - p_.v_end[at]);
-  const RigidMotion turn = rigid_part(change);
-  for (uint32_t i = 0; i < p_.n; ++i) {
-    const size_t at = size_t(i) * kStride;
-    add3(&p_.v[at], load3(&change[at]) - turn.at(place(i)));
-  }
 }
 
 }  // namespace dfm

@@ -15,25 +15,15 @@ class ExplicitPoints : public Dynamics {
   ExplicitPoints(const Memory &memory, Phyxels &points, Surface &surface, ModelInstance &model,
                  const Array<uint32_t> &edges);
 
-  Abilities abilities() const override {
-    return {.forces = true, .springs = true, .placed = true, .energy = true};
-  }
   ExplicitTime measure(const Pose &placed, bool spectrum) override;
   bool rest_rows(const Pose &placed, double share, RestRows &out) override;
   bool bound(double time, double share, const AddRowSums &outside, StepBound &out) override;
   bool add_forces(const SubStep &now, bool keep) override;
   bool free_motion(const SubStep &now, double &kinetic) override;
-  Unknowns unknowns() override { return {p_.v_free.data(), p_.inv_mass.data(), nullptr}; }
   bool end_state(const SubStep &now, const double *surfel_impulse, bool touched) override;
-  void free_again(const SubStep &now) override;
   void take_part(double share, bool in_full, const double *surfel_impulse) override;
-  EndState end() const override {
-    const double *const v = in_place_ ? p_.v_free.data() : p_.v_end.data();
-    return {v, v};
-  }
   double damper_energy(double time) override;
   void commit(const SubStep &now) override;
-  void damp(double time, double c, double ahead) override;
 
  private:
   const Array<uint32_t> &edges_;
@@ -53,6 +43,7 @@ class ExplicitPoints : public Dynamics {
   Array<double> before_;   // [reached,3] m/s
 
   bool row_sums(const dfm_kin &k, double &cell);
+  void free_again(const SubStep &now);
   struct Trial;
   bool find_drag();
   void lag_rows(double lag);

@@ -54,16 +54,26 @@ ImplicitPoints::ImplicitPoints(const Memory &memory, Phyxels &points, Surface &s
       stiffness_(memory),
       memory_(memory),
       ways_(memory) {
-  use_memory(memory, stage_x_, stage_v_, middle_, load_before_);
+  use_memory(memory, stage_x_, stage_v_, middle_, p_.load_before);
   use_memory(memory, x_, v_, residual_, push_, change_, there_, springs_, dampers_, scale_, weight_, held_,
              alone_);
   x_.assign(size_t{kStride} * points.n, 0.0);
   v_ = alone_ = x_;
-  if (options_.second_order) stage_x_ = stage_v_ = middle_ = load_before_ = x_;
+  if (options_.second_order) stage_x_ = stage_v_ = middle_ = p_.load_before = x_;
   for (Array<double> *a : {&residual_, &push_, &change_, &there_, &scale_, &weight_})
     a->assign(size_t{3} * points.n, 0.0);
   held_.assign(points.n, 0);
   stiffness_.create(model, points.n);
+  abilities_ = {
+      .springs = true,
+      .placed = true,
+      .accurate = true,
+      .damps = true,
+      .parts = options_.second_order,
+      .claims = DFM_CAP_STIFFNESS | (stiffness_.constant() ? uint32_t{DFM_CAP_CONSTANT_STIFFNESS} : 0),
+      // of a stage; measured: 30 at 700 points, 60 at 4,300
+      .work = (options_.second_order ? 2 : 1) * kImplicitWork};
+  system_ = this;
   if (options_.second_order && options_.newton == 1 && !stiffness_.constant())
     fail(DFM_E_UNSUPPORTED,
          "the integrator tr_bdf2 needs more than one Newton iteration with model '%s'; choose "
@@ -126,7 +136,8 @@ void ImplicitPoints::turn_on() {
 bool ImplicitPoints::evaluate_at(const dfm_kin &k, double share) {
   if (share == 1) std::copy(p_.load.begin(), p_.load.end(), p_.f.begin());
   else
-    for (size_t j = 0; j < x_.size(); ++j) p_.f[j] = load_before_[j] + share * (p_.load[j] - load_before_[j]);
+    for (size_t j = 0; j < x_.size(); ++j)
+      p_.f[j] = p_.load_before[j] + share * (p_.load[j] - p_.load_before[j]);
   return model_.call("add_forces", [&] { return model_.ops->add_forces(model_.self, &k, p_.f.data()); }) ==
          DFM_OK;
 }
@@ -327,9 +338,9 @@ bool ImplicitPoints::two_stages(const SubStep &now) {
   return true;
 }
 
-void ImplicitPoints::begin(bool touched) {
-  staged_ = options_.second_order && !touched;
-  if (options_.second_order) load_before_ = p_.load;
+bool ImplicitPoints::choose_scheme(bool touched) {
+  const bool before = std::exchange(staged_, options_.second_order && !touched);
+  return staged_ == before;
 }
 
 bool ImplicitPoints::solve_stage(const SubStep &now, Array<double> &v) {
@@ -397,11 +408,12 @@ void ImplicitPoints::spread_impulses(const double *surfel_impulse, double scale,
 bool ImplicitPoints::end_state(const SubStep &now, const double *, bool touched) {
   if (!staged_ && !(touched && solved_)) p_.v_end = p_.v_free;
   const Array<double> &v = p_.v_end;
+  end_ = {v.data(), (staged_ ? p_.v_free : v).data()};
   if (!model_.state.empty() && !evaluate_after(v.data(), true)) return false;
   double nan_flag = 0;
   for (size_t j = 0; j < v.size(); ++j) {
     nan_flag += 0.0 * v[j];
-    p_.x_end[j] = p_.x[j] + now.h * mean()[j];
+    p_.x_end[j] = p_.x[j] + now.h * end_.mean[j];
   }
   return nan_flag == 0;
 }

@@ -14,7 +14,6 @@
 // Source: Baraff and Witkin 1998, Large steps in cloth simulation, section 3.
 #pragma once
 #include <memory>
-#include <utility>
 
 #include "body/implicit_system.h"
 #include "dynamics/dynamics.h"
@@ -30,24 +29,10 @@ class ImplicitPoints : public Dynamics, public ImplicitSystem {
   ImplicitPoints(const Memory &memory, Phyxels &points, Surface &surface, ModelInstance &model,
                  const ImplicitOptions &options);
 
-  Abilities abilities() const override {
-    return {.springs = true,
-            .placed = true,
-            .accurate = true,
-            .damps = true,
-            .parts = options_.second_order,
-            .claims = DFM_CAP_STIFFNESS | (stiffness_.constant() ? uint32_t{DFM_CAP_CONSTANT_STIFFNESS} : 0),
-            // of a stage; measured: 30 at 700 points, 60 at 4,300
-            .work = (options_.second_order ? 2 : 1) * kImplicitWork};
-  }
   bool bound(double time, double share, const AddRowSums &outside, StepBound &out) override;
-  void begin(bool touched) override;
-  void loads_before() override { load_before_ = p_.load; }
-  bool take_contact() override { return !std::exchange(staged_, false); }
+  bool choose_scheme(bool touched) override;
   bool free_motion(const SubStep &now, double &kinetic) override;
-  Unknowns unknowns() override { return {p_.v_free.data(), nullptr, this}; }
   bool end_state(const SubStep &now, const double *surfel_impulse, bool touched) override;
-  EndState end() const override { return {p_.v_end.data(), mean()}; }
   double accurate_step(const SubStep &now) const override;
   bool end_forces(const SubStep &) override { return !staged_ && evaluate_after(p_.v_end.data(), false); }
   void commit(const SubStep &now) override;
@@ -91,7 +76,6 @@ class ImplicitPoints : public Dynamics, public ImplicitSystem {
   bool staged_ = false;                  // this sub-step uses TR-BDF2
   Array<double> stage_x_, stage_v_;      // [npoint,4] m, m/s: x0, v0 of its stages
   Array<double> middle_;                 // [npoint,4] m/s, the end of its first stage
-  Array<double> load_before_;            // [npoint,4] N, at the start of the sub-step
   Array<double> x_, v_;                  // [npoint,4] m, m/s: state of the last force evaluation
   Array<double> residual_;               // [npoint,3] N s
   Array<double> push_, there_, change_;  // [npoint,3] m/s: scratch; a solution
@@ -106,7 +90,6 @@ class ImplicitPoints : public Dynamics, public ImplicitSystem {
 
   std::unique_ptr<LinearSolver> new_solver() const;
   bool begin_stage(const SubStep &now);
-  const double *mean() const { return staged_ ? p_.v_free.data() : p_.v_end.data(); }
   bool evaluate_after(const double *v, bool commits);
   void turn_on();
   bool evaluate_at(const dfm_kin &k, double share);

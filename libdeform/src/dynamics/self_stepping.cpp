@@ -14,7 +14,7 @@ SelfStepping::SelfStepping(const Memory &memory, Phyxels &points, Surface &surfa
       mean_(size_t(kStride) * points.n, 0.0, memory),
       surfels_(size_t(3) * surface.nsurfel, 0.0, memory) {
   use_memory(memory, unit_, near_, stiffness_, damping_);
-  if (!model.late) return;
+  if (!(abilities_.late = model.late.has_value())) return;
   std::vector<uint8_t> near(points.n, 0);
   for (uint32_t s = 0; s < surface.nsurfel; ++s)
     surface.each_phyxel(s, [&](uint32_t point, double) { near[point] = 1; });
@@ -120,6 +120,7 @@ bool SelfStepping::end_state(const SubStep &now, const double *surfel_impulse, b
   const auto ends = model_.late ? model_.late->commit : model_.stepper->commit;
   const auto end = [&] { return ends(model_.self, &k, surfel_impulse, x, v); };
   if (model_.call("commit", end) != DFM_OK) return false;
+  end_ = {v, mean_.data()};
   double nan_flag = 0;
   each_moved([&](size_t j) {
     nan_flag += 0.0 * x[j] + 0.0 * v[j];
@@ -150,15 +151,6 @@ void SelfStepping::take_part(double share, bool in_full, const double *surfel_im
   Dynamics::take_part(share, in_full, surfel_impulse);
 }
 
-void SelfStepping::see_points() {
-  if (!unseen_.load(std::memory_order_acquire)) return;
-  const std::lock_guard<std::mutex> one(seeing_);
-  if (!unseen_.load(std::memory_order_relaxed)) return;
-  const dfm_kin k = kin(0, 0);
-  model_.call("points", [&] { return model_.late->points(model_.self, &k, p_.x.data(), p_.v.data()); });
-  unseen_.store(false, std::memory_order_release);
-}
-
 bool SelfStepping::sums(BodySums &out) const {
   if (!model_.late || !model_.late->sums) return false;
   const dfm_kin k = kin(0, 0);
@@ -168,11 +160,6 @@ bool SelfStepping::sums(BodySums &out) const {
   for (const uint32_t i : near_)
     for (size_t c = 0; c < 3; ++c) out.reach = std::max(out.reach, std::fabs(p_.x[size_t(i) * kStride + c]));
   return true;
-}
-
-void SelfStepping::points_changed() {
-  if (!model_.late) return;
-  model_.call("look", [&] { return model_.late->look(model_.self, model_.state.data()); });
 }
 
 }  // namespace dfm

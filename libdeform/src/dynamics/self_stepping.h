@@ -2,8 +2,6 @@
 // ends the sub-step. If it can compute points later (dfm.late_points/1), a sub-step moves only the points on
 // which surfels depend and held points, so the cost of a probe does not grow with the interior.
 #pragma once
-#include <atomic>
-#include <mutex>
 #include <optional>
 
 #include "dynamics/dynamics.h"
@@ -14,18 +12,13 @@ class SelfStepping : public Dynamics {
  public:
   SelfStepping(const Memory &memory, Phyxels &points, Surface &surface, ModelInstance &model);
 
-  Abilities abilities() const override { return {.late = model_.late.has_value()}; }
   bool bound(double time, double share, const AddRowSums &outside, StepBound &out) override;
   double contact_step() override;
   bool free_motion(const SubStep &now, double &kinetic) override;
-  Unknowns unknowns() override { return {surface_.v.data()}; }
   bool response(const SubStep &now, uint32_t n, const uint32_t *surfel, double *responses) override;
   bool end_state(const SubStep &now, const double *surfel_impulse, bool touched) override;
-  EndState end() const override { return {p_.v_end.data(), mean_.data()}; }
   void commit(const SubStep &now) override;
-  void see_points() override;
   void take_part(double share, bool in_full, const double *surfel_impulse) override;
-  void points_changed() override;
   bool sums(BodySums &out) const override;
 
  private:
@@ -35,8 +28,6 @@ class SelfStepping : public Dynamics {
   Array<double> stiffness_, damping_;   // row sums, of a model that names a bound
   std::optional<double> contact_step_;  // s; empty: not asked for yet
   Array<uint32_t> near_;                // late points: those that every sub-step moves
-  std::atomic<bool> unseen_ = false;
-  std::mutex seeing_;
 
   bool respond(const SubStep &now, uint32_t n, const uint32_t *surfel, uint32_t nrhs, const double *p,
                double *du) const;

@@ -36,7 +36,7 @@ void damp_changes_of_size(World &w, const StepContext &step) {
   const double stable = w.bound.step / kBoundShare, c = next_damping(w.sizes, step.length.planned, stable);
   if (!(c > 0)) return;
   each_active(w, step.active, kPointsToPull, [&](Body &b) {
-    b.dynamics->damp(w.time + step.h, c, kAlong * stable);
+    if (b.dynamics->unknowns().diagonal) b.dynamics->damp(w.time + step.h, c, kAlong * stable);
     return true;
   });
 }

@@ -23,7 +23,11 @@ void begin_bodies(World &w, StepContext &step) {
   if (!step.bodies_part) return;
   step.near.assign(w.bodies.size(), 0);
   each_body_held(w, [&](uint32_t i) { step.near[i] = 1; });
-  for (size_t i = 0; i < w.bodies.size(); ++i) w.bodies[i]->dynamics->begin(step.near[i]);
+  for (size_t i = 0; i < w.bodies.size(); ++i) {
+    Body &b = *w.bodies[i];
+    b.dynamics->choose_scheme(step.near[i]);
+    if (b.dynamics->abilities().parts) b.p.load_before = b.p.load;
+  }
 }
 
 namespace {

@@ -471,7 +471,9 @@ Next stage_guard(World &w, StepContext &step, uint32_t *trouble) {
   }
   if (step.guard.solves < kSolves && may_solve_again(w, step, step.guard.hits.size())) {
     guard_add_hits(w, step);
-    for (const uint32_t i : step.active) w.bodies[i]->dynamics->free_again(sub_step_of(w, step));
+    for (const uint32_t i : step.active)
+      if (Dynamics &d = *w.bodies[i]->dynamics; d.unknowns().diagonal)
+        d.end_state(sub_step_of(w, step), nullptr, false);
     step.guard.resolving = true;
     ++step.guard.solves;
     ++w.stats.guard_solves;

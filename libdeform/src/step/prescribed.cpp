@@ -48,7 +48,7 @@ bool stage_motion(World &w, StepContext &step, uint32_t *) {
       };
       if (b->dynamics->abilities().parts) {
         set(w.prescribed.at(w.time));
-        b->dynamics->loads_before();
+        b->p.load_before = b->p.load;
       }
       set(end);
     }

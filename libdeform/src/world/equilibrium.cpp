@@ -91,15 +91,6 @@ class SettlingPoints : public ImplicitPoints {
     return true;
   }
 
-  Abilities abilities() const override {
-    Abilities a = ImplicitPoints::abilities();
-    a.damps = false;  // its steps are not steps in time
-    return a;
-  }
-  // Flow is complete however long the step is.
-  dfm_kin kin(double time, double, bool trial) const override {
-    return ImplicitPoints::kin(time, kForever, trial);
-  }
   bool bound(double time, double share, const AddRowSums &outside, StepBound &out) override;
   bool free_motion(const SubStep &now, double &kinetic) override;
   const double *start() const override { return p_.v_free.data(); }  // with the last contact forces
@@ -124,6 +115,8 @@ SettlingPoints::SettlingPoints(const Memory &memory, Phyxels &points, Surface &s
                                const ImplicitOptions &options, const std::vector<double> &softness,
                                bool alone)
     : ImplicitPoints(memory, points, surface, model, options), alone_(alone) {
+  abilities_.damps = false;  // its steps are not steps in time
+  least_h_ = kForever;       // flow is complete however long the step is
   use_memory(memory, softness_, way_, force_, load_);
   force_.assign(size_t{3} * points.n, 0.0);
   way_.assign(size_t{kStride} * points.n, 0.0);

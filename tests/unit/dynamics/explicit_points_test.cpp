@@ -191,7 +191,7 @@ TEST(ExplicitPoints, BeforeAFurtherSolve_TheVelocityIsFreeAgain) {
   const Falling f;
   const std::vector<double> free(f.body->p.v_free.begin(), f.body->p.v_free.end());
   f.end(f.impulses(1, 2));
-  f.body->dynamics->free_again(f.now);
+  f.body->dynamics->end_state(f.now, nullptr, false);
   const double *const v = f.body->dynamics->unknowns().velocity;
   for (size_t k = 0; k < free.size(); ++k) EXPECT_EQ(v[k], free[k]) << k;
 }

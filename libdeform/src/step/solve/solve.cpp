@@ -220,7 +220,7 @@ void add_up(World &w, StepContext &step) {
 // False: the sub-step is to be repeated, with the integrator that contacts need.
 bool contacts_taken(World &w, StepContext &step) {
   bool all = true;
-  each_body_touched(w, step, [&](uint32_t slot) { all &= w.bodies[slot]->dynamics->take_contact(); });
+  each_body_touched(w, step, [&](uint32_t slot) { all &= w.bodies[slot]->dynamics->choose_scheme(true); });
   if (!all) step.length.repeat(1);
   return all;
 }
