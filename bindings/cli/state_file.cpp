@@ -126,13 +126,13 @@ uint64_t hash_of(const std::string &bytes) {
 uint64_t scene_hash(const SceneFile &scene) {
   JsonValue text;
   if (!parse_json(scene.value(""), text)) throw Failure(kBadInput, scene.path() + ": no scene to hash");
-  const auto leave_out = [](JsonValue &from, const char *name) {
+  const auto erase = [](JsonValue &from, const char *name) {
     std::erase_if(from.members, [&](const JsonMember &m) { return m.name == name; });
   };
-  leave_out(text, "output");
-  leave_out(text, "devices");  // why they were chosen; the bodies have the models
+  erase(text, "output");
+  erase(text, "devices");  // why they were chosen; the bodies have the models
   for (JsonMember &m : text.members)
-    if (m.name == "time") leave_out(m.value, "duration");
+    if (m.name == "time") erase(m.value, "duration");
   return hash_of(json_text(text));
 }
 

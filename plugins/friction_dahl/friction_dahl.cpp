@@ -98,16 +98,16 @@ DEFORM_PASS inline void trial(double a, const bristle::Batch &batch, const Block
 
 DEFORM_PASS inline void solve(double a, Trial &t) {
   double active[kLanes];
-  uint64_t looks = 1;
+  uint64_t any = 1;
   EACH_LANE (i) active[i] = t.on[i];
-  for (int pass = 0; pass < 60 && looks; ++pass) {
-    looks = 0;
+  for (int pass = 0; pass < 60 && any; ++pass) {
+    any = 0;
     EACH_LANE (i) {
       const double y = t.y[i], s = power(y, a), by_y = 1.0 / (y > 1e-150 ? y : 1e-150);
       const double to = y - ((y - std::fabs(t.R[i])) + t.p[i] * s) / (1.0 + a * (t.p[i] * s) * by_y);
       const double next = active[i] > 0 ? to : y;
       active[i] = y - next > 4e-16 * y ? active[i] : 0.0;
-      looks |= active[i] > 0 ? uint64_t(1) : uint64_t(0);
+      any |= active[i] > 0 ? uint64_t(1) : uint64_t(0);
       t.y[i] = next > 0 ? next : 0.0;
     }
   }

@@ -105,7 +105,7 @@ void Solid::find_properties(Held held) {
     if (rest[3 * i] < kCube / 4) fixed[i] = 7;
   for (uint32_t c = 0; c < ncell(); ++c) {
     const uint32_t *const q = &cells[nodes() * size_t(c)];
-    double share[dfm::kMostNodes];
+    double share[dfm::kMaxNodes];
     dfm::mass_shares(dfm::cell_kind(cell), rest.data(), q, share);
     for (uint32_t k = 0; k < nodes(); ++k) mass[q[k]] += kDensity * volume(c) * share[k];
   }

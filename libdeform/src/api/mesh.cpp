@@ -83,7 +83,7 @@ void keep(dfm_context &context, RestMesh &&mesh, dfm_mesh_handle *out, const cha
                    end_live<Kind::mesh, MeshObject>);
 }
 
-// "About" so many cells are asked for; who gets others by more than a quarter is told.
+// "About" so many cells are asked for; a difference of more than a quarter is reported.
 void warn_cell_count(RestMesh &mesh, const char *kind, uint32_t requested) {
   constexpr double kAbout = 1.25;
   const CellKind &of = cell_kind(mesh.cell);

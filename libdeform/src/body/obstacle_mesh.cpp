@@ -99,9 +99,9 @@ uint64_t ObstacleMesh::triangles_near(Vec3 lo, Vec3 hi, std::vector<uint32_t> &o
         0.5 * (std::fabs(a.x) * wide.x + std::fabs(a.y) * wide.y + std::fabs(a.z) * wide.z) + slack;
     return {middle - half, middle + half};
   };
-  uint64_t looks = 0;
+  uint64_t visits = 0;
   const auto near = [&](const Box &box) {
-    ++looks;
+    ++visits;
     for (int k = 0; k < 3; ++k)
       if (const Span s = around(box, k); !(s.lo <= hi[k] && s.hi >= lo[k])) return false;
     return true;
@@ -114,14 +114,14 @@ uint64_t ObstacleMesh::triangles_near(Vec3 lo, Vec3 hi, std::vector<uint32_t> &o
   if (!tree || within(tree->root())) {
     out.resize(surface.ntri);
     std::iota(out.begin(), out.end(), 0u);
-    return looks;
+    return visits;
   }
   walk(*tree, near, [&](uint32_t place) {
     out.push_back(tree->triangles()[place]);
     return true;
   });
   std::sort(out.begin(), out.end());
-  return looks;
+  return visits;
 }
 
 const Extent &ObstacleMesh::bounds() {

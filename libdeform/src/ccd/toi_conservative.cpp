@@ -80,7 +80,7 @@ class Advance {
   // near to it as values allow.
   double last_clear(double sign, double lo, double hi) {
     const Poly slope = c_.f.derivative();
-    const double aim = clear_ + 0.5 * c_.error, enough = clear_ + c_.error;
+    const double target = clear_ + 0.5 * c_.error, enough = clear_ + c_.error;
     double x = lo;
     while (hi - lo > 0x1p-52) {
       const double value = sign * c_.f(x);
@@ -88,7 +88,7 @@ class Advance {
       if (value > clear_) lo = x;
       else hi = x;
       if (value > clear_ && value <= enough) break;
-      x -= (value - aim) / (sign * slope(x));
+      x -= (value - target) / (sign * slope(x));
       if (!(x > lo && x < hi)) x = 0.5 * (lo + hi);
       if (x <= lo || x >= hi) break;
     }
@@ -115,8 +115,8 @@ class Advance {
   // Advances further than the fixed plane allows, to the contact time predicted by the slope of the distance.
   bool turning_plane(Separation &s, double &t, double fixed, double &stride) {
     const double slope = dot(s.normal, q_.at(1, s.u, s.v) - q_.at(t, s.u, s.v)) / (1 - t);
-    const double aim = 0.5 * (safe_ + stop_);
-    double to = slope < 0 ? std::min(1.0, t + (s.lower - aim) / -slope) : 1.0;
+    const double target = 0.5 * (safe_ + stop_);
+    double to = slope < 0 ? std::min(1.0, t + (s.lower - target) / -slope) : 1.0;
     to = std::min(to, t + stride);
     while (to > fixed && root_.evaluations < uint32_t(q_.max_iterations)) {
       const Separation ahead = look(to);

@@ -7,9 +7,9 @@ namespace dfm {
 namespace {
 
 // The impulse of a drag along its way, at the impulses that the others have. It is one unknown and found in
-// closed form: what stops the edge, the limit, or what does the work that is left (due),
+// closed form: what stops the edge, the limit, or what does the remaining work W,
 //
-//     l (s - w l) = due with the speed s without it,   l = 2 due / (s + sqrt(s^2 - 4 w due))
+//     l (s - w l) = W with the speed s without it,   l = 2 W / (s + sqrt(s^2 - 4 w W))
 struct Drag { double impulse, limit; };
 Drag drag_of(const ContactRows &rows, uint32_t row) {
   const ContactRows::BondRow &b = rows.bond[row - rows.n];

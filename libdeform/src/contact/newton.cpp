@@ -100,7 +100,7 @@ bool ContactNewton::find_way(bool symmetric, double tolerance) {
     std::fill_n(out, g_.size(), 0.0);
     solver_->solve(1, in, out, Set::accuracy, info);
     definite = definite && !info.indefinite;
-    products_ += info.iterations;  // each as dear as one of those outside
+    products_ += info.iterations;  // each costs as much as one of those outside
   };
   for (bool fresh : {false, true}) {
     if (!fresh && (!factored_ || !solver_->direct() || kept_for_ >= Set::inner)) continue;
@@ -255,7 +255,7 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
   goal_ = Set::accuracy * tolerance;
   lh_.assign(l_.begin(), l_.end());
   if (!evaluate(false) || !host_->judge(residual_)) return false;
-  double left = std::max(residual_.speed, error()), aim = left;  // m/s
+  double left = std::max(residual_.speed, error()), reference = left;  // m/s
   double best = std::numeric_limits<double>::infinity();
   bool spent = false;
   uint32_t slow = 0, stood = 0;
@@ -263,7 +263,7 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
   for (passes_ = 0; passes_ < steps;) {
     ++passes_;
     before.assign(v_.begin(), v_.end());
-    const double goal = Set::accuracy * std::max(aim, tolerance);
+    const double goal = Set::accuracy * std::max(reference, tolerance);
     double off;
     bool round;
     if (!newton(goal, off, round)) return false;
@@ -302,7 +302,7 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
       if (found_ || stiffest) break;
       scale_penalties(Set::penalty);
     }
-    aim = stalled ? off : now;
+    reference = stalled ? off : now;
     slow = now > 0.5 * left ? slow + 1 : 0;
     left = now;
     if (slow < Set::rounds) continue;

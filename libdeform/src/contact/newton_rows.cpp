@@ -177,7 +177,7 @@ void ContactNewton::set_bias() {
     for (uint32_t j = rows.begin[i]; j < rows.begin[i + 1]; ++j) {
       const uint32_t node = node_of_dof_[rows.dof[j]];
       if (node == kNone) continue;
-      for (int c = 0; c < 3; ++c)  // a component that is held moves as it is told
+      for (int c = 0; c < 3; ++c)  // a component that is held moves as prescribed
         if (inverse_[3 * size_t{node} + size_t(c)] == 0)
           u += (rows.weight[j] * v_[size_t{kStride} * node + size_t(c)]) * Vec3{f[c], f[3 + c], f[6 + c]};
     }
@@ -245,7 +245,7 @@ void ContactNewton::evaluate_bond(uint32_t k) {
   store3(&l_[3 * size_t{k}], l);
 }
 
-// r of the bodies at v: multipliers and limits change without v, and the forces of models are dear.
+// r of the bodies at v: multipliers and limits change without v, and the forces of models are expensive.
 bool ContactNewton::find_residual() {
   const auto end = v_.begin() + std::ptrdiff_t(kStride * size_t{single_});
   if (known_ && std::equal(v_.begin(), end, of_v_.begin())) return true;

@@ -309,8 +309,8 @@ void ContactRows::set_diagonal(uint32_t i) {
 namespace {
 
 // A depth closes by a fifth per sub-step. Closed at once it would leave the bodies apart at gap / h, and a
-// contact that comes with a little depth (an edge of a face that bends) would be struck away, come back
-// deeper, and never rest.
+// contact that comes with a little depth (an edge of a face that bends) would bounce off, come back deeper,
+// and never rest.
 constexpr double kCloses = 0.2;
 // The last part of the distance must be kept: a point that slides over a turning face comes nearer by slip
 // times rotation in every sub-step, which the straight motion of the contact does not include. Deeper than

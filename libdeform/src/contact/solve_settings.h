@@ -46,7 +46,7 @@ struct SolveSettings {
   // leaves, and loads that share a place wander where gaps differ by it; sweeps there go on to its square.
   static constexpr double exact = 1e-3;
 
-  // Of the slip that a stuck contact owes, the share that is taken back over a planned sub-step (all at once
+  // Share of the slip error of a sticking contact that is taken back over a planned sub-step (all at once
   // would be a velocity as large as the error, which the next solve stops again).
   static constexpr double take_back = 0.4;
 };

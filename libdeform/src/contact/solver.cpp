@@ -82,10 +82,10 @@ Residual residual_of(const ContactRows &rows, const RowsPart &part, const Contac
 
 double share_of_least_work(const ContactRows &rows, const RowsPart &part) {
   double none = 0, full = 0;  // J, the slope of the function without impulses and with all of them
-  const auto add = [&](uint32_t i, Vec3 rate, Vec3 yields) {
+  const auto add = [&](uint32_t i, Vec3 rate, Vec3 softness) {
     const Vec3 l = load3(&rows.impulse[size_t(3) * i]);
     none += dot(l, rows.velocity(i, rows.y_free.data()) + rate);
-    full += dot(l, rows.velocity(i) + rate + yields);
+    full += dot(l, rows.velocity(i) + rate + softness);
   };
   each_row(part.contacts, [&](uint32_t i) {
     const double l = rows.impulse[size_t(3) * i];
@@ -102,16 +102,16 @@ namespace {
 
 // f(entries of the body) for both sides of contact i.
 template <class T, class F>
-void each_side(const uint32_t *sides, uint32_t i, T *disturbance, F &&f) {
+void each_side(const uint32_t *sides, uint32_t i, T *start_residual, F &&f) {
   const uint32_t *const side = sides + 2 * size_t{i};
-  if (side[0] != kNone) f(disturbance + 2 * size_t{side[0]});
-  if (side[1] != kNone) f(disturbance + 2 * size_t{side[1]});
+  if (side[0] != kNone) f(start_residual + 2 * size_t{side[0]});
+  if (side[1] != kNone) f(start_residual + 2 * size_t{side[1]});
 }
 
 }  // namespace
 
 void find_disturbance(const ContactRows &rows, const RowsPart &part, const ContactState &law, double h,
-                      const uint32_t *sides, double *disturbance) {
+                      const uint32_t *sides, double *start_residual) {
   each_row(part.contacts, [&](uint32_t i) {
     if (!(rows.wn[i] > 0)) return;
     const Vec3 u = rows.velocity(i);
@@ -119,7 +119,7 @@ void find_disturbance(const ContactRows &rows, const RowsPart &part, const Conta
     const bool friction = rows.wt[i] > 0 && (l[0] > 0 || law.fn[i] > 0);
     const double normal = normal_residual(rows, i, u.x, l);
     const double tangent = friction ? tangent_residual(rows, law, i, h, u, l) : 0;
-    each_side(sides, i, disturbance, [&](double *d) {
+    each_side(sides, i, start_residual, [&](double *d) {
       d[0] = std::max(d[0], tangent);
       d[1] = std::max({d[1], tangent, normal});
     });
@@ -127,15 +127,15 @@ void find_disturbance(const ContactRows &rows, const RowsPart &part, const Conta
 }
 
 void set_tolerance(const ContactRows &rows, const RowsPart &part, std::span<const ContactPoint> contacts,
-                   double h, const ToleranceBounds &bounds, const uint32_t *sides, const double *disturbance,
-                   Tolerance &tolerance) {
+                   double h, const ToleranceBounds &bounds, const uint32_t *sides,
+                   const double *start_residual, Tolerance &tolerance) {
   tolerance.most_normal = bounds.most_normal;
   each_row(part.contacts, [&](uint32_t i) {
     // what a gap is off by where coordinates are large: a few roundings of them
     double normal = bounds.normal;
     if (i < rows.soft()) normal = std::max(normal, 0x1p-49 * norm(load3(contacts[i].point)) / h);
     double tangent = bounds.tangent;
-    each_side(sides, i, disturbance, [&](const double *d) {
+    each_side(sides, i, start_residual, [&](const double *d) {
       tangent = std::max(tangent, SolveSettings::of_start * d[0]);
       normal = std::max(normal, SolveSettings::of_start * d[1]);
     });

@@ -45,17 +45,17 @@ double share_of_least_work(const ContactRows &rows, const RowsPart &part);
 Residual larger(const Residual &a, const Residual &b);
 
 // d of the bodies of a part: the largest r_t that the warm start leaves at any contact of the body, and the
-// largest of all r_n and r_t; no less than disturbance has already. sides: [contacts,2] numbers of bodies,
-// kNone: an obstacle; disturbance: [bodies,2].
+// largest of all r_n and r_t; no less than start_residual has already. sides: [contacts,2] numbers of bodies,
+// kNone: an obstacle; start_residual: [bodies,2].
 void find_disturbance(const ContactRows &rows, const RowsPart &part, const ContactState &law, double h,
-                      const uint32_t *sides, double *disturbance);
+                      const uint32_t *sides, double *start_residual);
 // tangent[i] = max(bounds.tangent, 1e-2 d), d the larger one of the two bodies. A contact at rest is warm
 // started at its solution, so d vanishes and the bound at rest rules; while bodies shake, a hundredth of what
 // the sub-step changes is enough, and what is left is part of the next sub-step's d. normal[i] =
 // max(bounds.normal, 1e-2 d), with the second d, up to most_normal. bond = max(bounds.tangent, 1e-3 of the
 // largest that the warm start leaves).
 void set_tolerance(const ContactRows &rows, const RowsPart &part, std::span<const ContactPoint> contacts,
-                   double h, const ToleranceBounds &bounds, const uint32_t *sides, const double *disturbance,
-                   Tolerance &tolerance);
+                   double h, const ToleranceBounds &bounds, const uint32_t *sides,
+                   const double *start_residual, Tolerance &tolerance);
 
 }  // namespace dfm

@@ -55,10 +55,10 @@ template <class Ready, class Most>
 bool spin(Ready ready, Most most) {
   using Clock = std::chrono::steady_clock;
   constexpr auto kMoment = std::chrono::microseconds(20), kYieldInterval = std::chrono::microseconds(5);
-  constexpr int kLooks = 32;  // between two looks at the clock
+  constexpr int kSpins = 32;  // between two readings of the clock
   const Clock::time_point start = Clock::now();
   for (auto next_check = kMoment;;) {
-    for (int i = 0; i < kLooks; ++i) {
+    for (int i = 0; i < kSpins; ++i) {
       if (ready()) return true;
 #if defined(__x86_64__)
       __builtin_ia32_pause();

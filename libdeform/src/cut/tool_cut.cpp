@@ -79,8 +79,8 @@ class Opening {
       parts_.push_back(std::move(part));
     }
   }
-  // After they have opened: the tool owes it at the points that these corners have now, as much at each. What
-  // is due at a point within the body would have to wait, so those at the surface come first.
+  // After they have opened: the work is charged to the points that these corners have now, equal shares. That
+  // of a point within the body would have to wait, so those at the surface come first.
   void charge(const Body &b, const Pose &place, BladeTrack &to) const {
     const auto &surface = b.surface.point;
     for (const Part &part : parts_) {

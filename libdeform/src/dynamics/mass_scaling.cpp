@@ -7,7 +7,7 @@
 // q is the projection of d / m on these. So the total mass, the center and the moments of inertia stay, and
 // with the second moments the kinetic energy of every velocity that is an affine function of the place: of
 // any rigid motion and any uniform strain. Where u is a quadratic polynomial, as in bending and
-// torsion, the kinetic energy changes by u.(m' - m) u, of which the largest share of u.m u is told.
+// torsion, the kinetic energy changes by u.(m' - m) u, of which the largest share of u.m u is reported.
 #include "dynamics/mass_scaling.h"
 
 #include <algorithm>

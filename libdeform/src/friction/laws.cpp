@@ -205,7 +205,7 @@ const LawInstance *LawBatches::evaluate(const LawInstance &law, std::span<const 
     });
     state.limit[i] = out.limit[k];
     state.mode[i] = out.mode[k];
-    // the poison of NaN and infinity is not zero; a limit of +inf is valid: no limit
+    // 0 times NaN or infinity is not zero; a limit of +inf is valid: no limit
     if (failed_ == kNone && !(nan_flag == 0 && out.limit[k] >= 0)) failed_ = i;
   }
   if (!state.scale.empty())

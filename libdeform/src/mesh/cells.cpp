@@ -61,8 +61,8 @@ Vec3 place_of(uint32_t node) {
 
 // Of the place by the three coordinates there, its determinant; points [n,stride].
 double jacobian(uint32_t nodes, const double *points, size_t stride, const uint32_t *cell, Vec3 at) {
-  double value[kMostNodes];
-  Vec3 slope[kMostNodes], along[3];
+  double value[kMaxNodes];
+  Vec3 slope[kMaxNodes], along[3];
   hexahedron_shapes(nodes, at, value, slope);
   for (uint32_t k = 0; k < nodes; ++k) {
     const Vec3 x = load3(points + stride * cell[k]);
@@ -142,8 +142,8 @@ void mass_shares(const CellKind &kind, const double *points, const uint32_t *cel
     const Vec3 place = kind.nodes == 8    ? kGauss * place_of(q)
                        : kind.nodes == 20 ? inside_place(q)
                                           : place_of(q);
-    double weight = jacobian(kind.nodes, points, 3, cell, place), shape[kMostNodes];
-    Vec3 slope[kMostNodes];
+    double weight = jacobian(kind.nodes, points, 3, cell, place), shape[kMaxNodes];
+    Vec3 slope[kMaxNodes];
     if (kind.nodes == 20) weight *= kShare[q % 3] * kShare[q / 3 % 3] * kShare[q / 9];
     for (int axis = 0; kind.nodes == 27 && axis < 3; ++axis) weight *= kPlace[q][axis] ? 1 : 4;
     hexahedron_shapes(kind.nodes, place, shape, slope);

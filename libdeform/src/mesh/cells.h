@@ -18,7 +18,7 @@ struct CellKind {
   const char *medit;      // null: not in these files
   const uint8_t *in_msh;  // place of each node of an MSH file in ours; null: the same
 };
-inline constexpr uint32_t kMostNodes = 27;
+inline constexpr uint32_t kMaxNodes = 27;
 // All kinds.
 std::span<const CellKind> cell_kinds();
 // Throws DFM_E_ARG where the kind is none of these.

@@ -28,7 +28,7 @@ namespace {
 
 constexpr double kShareFloor = 0.1;  // of the fullest cell around
 // A layer of cells of which a part s is material bends like one of its thickness and s times the modulus, so
-// 1/s^2 times too stiffly. It is told from a factor of four on, if a tenth of the material is concerned.
+// 1/s^2 times too stiffly. It is reported from a factor of four on, if a tenth of the material is concerned.
 constexpr double kThin = 0.5, kWarnThin = 0.1;
 constexpr double kOpening = 0.1;       // openings up to this part of the closed area are filled across
 constexpr double kDeviations = 4;      // sampled and summed volume agree within so many standard deviations

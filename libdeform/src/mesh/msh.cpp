@@ -32,7 +32,7 @@ void MshReader::begin_elements(int64_t type) {
 }
 
 void MshReader::add_element(uint32_t group) {
-  uint32_t corners[kMostNodes];
+  uint32_t corners[kMaxNodes];
   if (cell_ || curved_face_ || (element_.points <= 4 && element_.dimension == 2)) {
     for (uint32_t k = 0; k < element_.points; ++k)
       corners[cell_ && cell_->in_msh ? cell_->in_msh[k] : k] = nodes_.find(in_, tags_[k]);

@@ -239,7 +239,7 @@ class AbaqusReader {
   }
 
   void read_element(uint32_t kind, uint32_t n) {
-    uint32_t nodes[kMostNodes];
+    uint32_t nodes[kMaxNodes];
     for (uint32_t k = 0; k < n; ++k) {
       std::string_view word = in_.line_word();
       while (word.empty() && data()) word = in_.line_word();

@@ -455,7 +455,7 @@ void Self::share_areas(size_t begin, size_t edges, Array<uint8_t> &lent) {
 template <bool Opened>
 void Self::find(SelfPairs &pairs, Array<uint8_t> &lent) {
   const size_t begin = out.size();
-  // copies are told by their places, not by where they are set back
+  // copies are known by their places, not by where they are set back
   const double within = Opened ? HUGE_VAL : pairs.within;
   const std::span<const SelfPair> vf = pairs.vertex_face, ee = pairs.edge_edge;
   for (size_t i = 0; i < vf.size(); ++i)

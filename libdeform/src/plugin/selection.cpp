@@ -82,9 +82,9 @@ std::vector<EffectRow> copy_effect_rows(const dfm_type &type, const void *from) 
   return out;
 }
 
-bool leave_out(const dfm_type &type, const std::vector<EffectRow> &rows, const Selection &selection,
-               const std::function<bool(const std::string &)> &works, std::vector<double> &values,
-               std::vector<uint8_t> &by_cell) {
+bool omit_effects(const dfm_type &type, const std::vector<EffectRow> &rows, const Selection &selection,
+                  const std::function<bool(const std::string &)> &works, std::vector<double> &values,
+                  std::vector<uint8_t> &by_cell) {
   const std::vector<size_t> first = first_values(type);
   const auto on = [&](const EffectRow &row) {
     return by_cell[row.param] || values[first[row.param]] != row.off;

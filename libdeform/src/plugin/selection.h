@@ -53,9 +53,9 @@ std::vector<EffectRow> copy_effect_rows(const dfm_type &type, const void *table)
 // Switches off the active effects of the type that are not selected: their rows of `values` (all rows end to
 // end) get the value "off", and by_cell[row] (whether the row differs by cell) becomes 0. A row on which a
 // selected effect depends is kept. Returns false if nothing has changed.
-bool leave_out(const dfm_type &type, const std::vector<EffectRow> &rows, const Selection &selection,
-               const std::function<bool(const std::string &)> &works, std::vector<double> &values,
-               std::vector<uint8_t> &by_cell);
+bool omit_effects(const dfm_type &type, const std::vector<EffectRow> &rows, const Selection &selection,
+                  const std::function<bool(const std::string &)> &works, std::vector<double> &values,
+                  std::vector<uint8_t> &by_cell);
 
 // ---- laws: dfm_friction.without ---------------------------------------------------------------------------
 struct LawEffect {

@@ -109,7 +109,7 @@ Params read_params(const Node &params, const dfm_type *type) {
   return out;
 }
 
-// A file that was not loaded and why: the one that speaks of this type, else the first; "": all were.
+// A file that was not loaded and why: the one that names this type, else the first; "": all were.
 static std::string passed_over(const Registry &types, const std::string &name) {
   std::string first;
   for (const PassedFile &p : types.passed()) {

@@ -261,8 +261,9 @@ void model_fields(Stream &s, B &b, const Body &like) {
   s.array("model's held", b.origin.held, like.origin.held.size(), must::at_most(7));
   s.value("integrator used", b.integrator.used,
           must::Be{[](uint32_t x) { return x - 1 < DFM_INTEGRATOR_TR_BDF2; }, "an integrator"});
-  s.value("chosen integrator", b.integrator.chosen,
-          must::Be{[](Chosen x) { return x <= Chosen::in_impact; }, "no, explicit, implicit or struck"});
+  s.value(
+      "chosen integrator", b.integrator.chosen,
+      must::Be{[](Chosen x) { return x <= Chosen::in_impact; }, "no, explicit, implicit or in an impact"});
   s.value("spectral share", b.integrator.share,
           must::Be{[](double x) { return x > 0 && x <= 1; }, "a share above zero"});
   s.value("lag of dampers", b.p.dampers.lag,

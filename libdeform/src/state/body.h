@@ -54,8 +54,8 @@ inline constexpr int32_t kNoCoupling = -1;
 
 // By which integrator a body moves. step: s, the longest explicit sub-step of the body as its model was made;
 // infinite: none, or not computed.
-// chosen: what the library has chosen where it was left to it. struck: implicit time, but explicit until an
-// impact is over (step/impact.h).
+// chosen: what the library has chosen where it was left to it. in_impact: implicit time, but explicit until
+// an impact is over (step/impact.h).
 enum class Chosen : uint32_t { no, explicitly, implicit, in_impact };
 struct Integrator {
   uint32_t used = DFM_INTEGRATOR_SYMPLECTIC_EULER;
@@ -78,7 +78,7 @@ struct SwitchedOff {
 // [nparam] 1: there is a field of that row.
 std::vector<uint8_t> differs_by_cell(const dfm_type &type, const std::vector<CellField> &fields);
 
-struct SpareModel {
+struct CachedModel {
   ModelInstance instance;
   ModelOrigin origin;
   SwitchedOff switched_off;
@@ -91,7 +91,7 @@ struct SpareModel {
 struct Squeezed {
   double pressure = 0, at = 0;  // Pa; s, of the last look
   double since = 0;             // s, of the last look at which it was small
-  double weight = 0;            // Pa, its own, if it has been told of
+  double weight = 0;            // Pa, its own, if it has been reported
   bool reported = false;
 };
 
@@ -130,7 +130,7 @@ struct OnPoints {
   std::vector<Spring> springs;
   std::vector<HeldMotion> motions;
   std::vector<BladeTrack> blades;  // of the last cuts
-  Array<double> anchor;            // [n,4] m, positions at the start of its calm; empty if sleep is off
+  Array<double> anchor;            // [n,4] m, positions when it came to rest; empty if sleep is off
 };
 
 // Points and cells of a body, and what depends on them. A cut exchanges it for another (cut/body_shape.h).
@@ -141,7 +141,7 @@ struct BodyShape : Structure, OnPoints, BodyModel {
   Array<double> surfel_impulse;  // [nsurfel,3] N s of the last sub-step
   double mass = 0, rest_volume = 0;
   // instances for future changes; they keep what they computed from the mesh
-  std::vector<SpareModel> spares;
+  std::vector<CachedModel> cached_models;
   std::unique_ptr<SearchTree> search;   // rays and closest points
   std::unique_ptr<SelfRest> self_rest;  // made with a cut; null: made when it is needed
 };

@@ -41,8 +41,8 @@ struct BladeSide {
   double along, way, off;  // along the edge, 0 to 1; m on the blade's way; m from it
 };
 
-// Energy that a tool owes for what it has cut, at a point of the body beside the cut. It pays over the way
-// that follows, by a force on the point (step/solve/cut_drag.h).
+// Energy of a cut, at a point of the body beside it, that is not yet taken from the tool. A force on the
+// point takes it along the path that follows (step/solve/cut_drag.h).
 struct CutWork {
   double energy, force;  // J; N
   double way[3];         // unit length, of the edge through the material; in the frame of the tool's part

@@ -59,7 +59,7 @@ void share_mass(Body &b, const double *density, double all) {
   std::fill(b.p.mass.begin(), b.p.mass.end(), 0.0);
   for (size_t c = 0; c < b.ncell() / kind.tets; ++c) {
     const uint32_t *const cell = &b.cells[kind.nodes * c];
-    double mass = 0, share[kMostNodes];
+    double mass = 0, share[kMaxNodes];
     for (size_t t = kind.tets * c; t < kind.tets * (c + 1); ++t)
       mass += (density ? density[t] : all) * tet_volume(b.p.rest.data(), &b.tets[4 * t]);
     mass_shares(kind, b.p.rest.data(), cell, share);

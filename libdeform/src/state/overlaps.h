@@ -28,7 +28,7 @@ struct Overlaps {
   std::vector<Overlap> found;  // by the last search
   std::vector<SuspendedPair> suspended;
   bool reported = true;  // a step has reported it
-  // m by the body of which both are parts: the largest depth that the log has told
+  // m by the body of which both are parts: the largest depth in the log
   std::vector<std::pair<uint64_t, double>> reported_depths;
   bool is_suspended(uint64_t a, uint64_t b, bool obstacle) const {
     return std::any_of(suspended.begin(), suspended.end(), [&](const SuspendedPair &p) {

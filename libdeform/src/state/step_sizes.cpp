@@ -11,7 +11,7 @@ namespace {
 
 using std::numbers::pi;
 constexpr double kRounding = 1e-9;  // relative, of the quotient of two sizes
-// sizes within this factor are the same rung: half the distance to the nearest rung, a factor of 8/7 away
+// sizes within this factor are the same step of the ladder: half the distance to the next, a factor of 8/7
 constexpr double kSame = 1.06;
 // longer sub-steps are used up to this share of the stable one, so that they need not be shortened again soon
 constexpr double kRise = 0.9;
@@ -22,8 +22,8 @@ constexpr uint32_t kMinQuietSteps = 64;  // sub-steps: four evaluations of the b
 constexpr double kVarying = 0.75;
 // s: changes that are further apart do not follow the rhythm of a mode for long
 constexpr double kLongestRhythm = 0.1;
-// A due impulse is divided among sub-steps, so that it meets each mode in several phases: at most this share,
-// but at least this one of the stable step squared.
+// The impulse of damping is divided among sub-steps, so that it meets each mode in several phases: at most
+// this share, but at least this one of the stable step squared.
 constexpr double kDampingShare = 0.25, kMinDamping = 1e-3;
 
 // The smallest of 1, 2, 3 and (4, 5, 6, 7) 2^k that is not below x.

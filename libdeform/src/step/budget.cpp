@@ -267,8 +267,9 @@ void share_work(const World &w, StepContext &step) {
   const auto left_by = [&](uint64_t kept) { return b.limit > b.work + kept ? b.limit - b.work - kept : 0; };
   const uint64_t own = b.other_work + checks(w, step, kDefaultChecks) + kEndOfSolve * b.rows;
   // a budget that does not hold all sub-steps ends the step before its end
-  const uint64_t fair = default_work(w, step), follow = std::min(substeps_to_come(step), left_by(own) / fair);
-  const double left = double(left_by(own + follow * fair));
+  const uint64_t standard = default_work(w, step),
+                 follow = std::min(substeps_to_come(step), left_by(own) / standard);
+  const double left = double(left_by(own + follow * standard));
   const double share = std::max(left / double(1 + follow), std::min(left, double(kDefaultSolve * b.rows)));
   b.solve_end = b.work + uint64_t(kSolveShare * share);
 }

@@ -19,9 +19,9 @@ StepContext::StepContext(const Meters &meters)
       renewal(meters.contacts.memory()),
       next_store(meters.contacts.memory()),
       islands(meters.steps.memory()) {
-  use_memory(meters.steps.memory(), driven, free_kinetic, looks, in_full, near, touching, active, woken,
+  use_memory(meters.steps.memory(), driven, free_kinetic, samples, in_full, near, touching, active, woken,
              stirred, roused.bodies, roused.dwell, roused.total);
-  use_memory(meters.contacts.memory(), lent, contacts, tolerance.normal, tolerance.tangent, disturbance,
+  use_memory(meters.contacts.memory(), lent, contacts, tolerance.normal, tolerance.tangent, start_residual,
              impulse_before_rebuild, tangents, slip_back, stick_drift, match, sharing, target_area,
              keeps_area, ways, renewed, rebound_speed, motions, marked, bonds, bond_impulse, chosen, mean,
              before, goes_on, given.list);

@@ -75,8 +75,8 @@ struct StepContext {
   std::vector<uint32_t> triangles;      // near one of them
   Array<Driven> driven;
   // predict
-  Array<double> free_kinetic;  // [bodies] J, without contact; of this sub-step
-  Array<EnergySample> looks;   // [active]
+  Array<double> free_kinetic;   // [bodies] J, without contact; of this sub-step
+  Array<EnergySample> samples;  // [active]
   // [bodies] where the guard takes a part of the motion: contact and forces act in full
   // (take_part_of_contact)
   Array<uint8_t> in_full;
@@ -98,7 +98,7 @@ struct StepContext {
   std::function<void(const SolveIsland *)> on_solve;
   struct { Array<double> normal, tangent; } tolerance;  // [contacts] of all islands
   Residual residual;                                    // the worst of all islands
-  Array<double> disturbance, impulse_before_rebuild;
+  Array<double> start_residual, impulse_before_rebuild;
   Array<double> tangents;
   // [contacts] m/s, at which sides leave each other at least; empty where no pair has a restitution
   Array<double> rebound_speed;

@@ -21,8 +21,8 @@
 namespace dfm {
 namespace {
 
-// A body in contact is struck if its mean velocity changes by more than so many times what gravity makes in
-// the sub-step, if that is more than this share of an edge in way (ten times the error that the steps of
+// A body in contact has an impact if its mean velocity changes by more than so many times what gravity makes
+// in the sub-step, if that is more than this share of an edge in way (ten times the error that the steps of
 // implicit bodies are allowed), and if the points lose more than this share of what a perfectly inelastic
 // impact takes. At rest the mean velocity stays, and friction on a slope or in a slide changes it by about
 // gravity's part.
@@ -143,7 +143,7 @@ void begin_impact(World &w) {
                                   b->surface.median_edge * b->integrator.step);
   turn(w, Chosen::implicit, Chosen::in_impact);
   w.impact_until = w.time + lasts;
-  w.context->logf(DFM_LOG_INFO, "a body was struck: explicit steps until %g s", w.impact_until);
+  w.context->logf(DFM_LOG_INFO, "impact of a body: explicit steps until %g s", w.impact_until);
 }
 
 bool end_impact(World &w) {

@@ -13,7 +13,7 @@ struct World;
 // Whether the library has chosen the length of the next step. Steps of the announced length are the host's;
 // others that are no longer than the offered one follow the errors of implicit bodies.
 bool chosen_by_library(const World &w, double dt);
-// Before a sub-step is committed: whether one of its bodies has been struck, so that the sub-step is to be
+// Before a sub-step is committed: whether one of its bodies has an impact, so that the sub-step is to be
 // repeated after begin_impact(). Warns where it may not be repeated.
 bool has_impact(World &w, const StepContext &step);
 // Why bodies that move by this implicit integrator will not rebound: a clause.

@@ -1,11 +1,11 @@
 // Sleep and waking.
 //
-//   end of a sub-step    A body is calm while all its points are slower than sleep_speed and within half of
-//                        d_c of where they were when it became calm. Speed alone would let slow drift pass,
-//                        and would keep a stiff body awake that vibrates by a nanometer. An island falls
-//                        asleep when all its bodies have been calm for sleep_time, none of its contacts
-//                        slides or touches a moving obstacle or a rigid host's body, and no prescribed motion
-//                        or load of its bodies is still to come
+//   end of a sub-step    A body is at rest while all its points are slower than sleep_speed and within half
+//                        of d_c of where they were when it came to rest. Speed alone would let slow drift
+//                        pass, and would keep a stiff body awake that vibrates by a nanometer. An island
+//                        falls asleep when all its bodies have been at rest for sleep_time, none of its
+//                        contacts slides or touches a moving obstacle or a rigid host's body, and no
+//                        prescribed motion or load of its bodies is still to come
 //   asleep               x, contacts and their forces stay, v = 0; no stage works on the body. Detection
 //                        keeps its shape as a partner: pairs with at least one side awake, or with a moving
 //                        obstacle, are tested as before

@@ -1,5 +1,5 @@
 // The stages of a sub-step, and shared functions. The table has their order (step/step.cpp), which no stage
-// changes: what has to run again is told by Next. Return false or Next::stop if the sub-step failed;
+// changes: Next says what has to run again. Return false or Next::stop if the sub-step failed;
 // `trouble` and dfm_last_error() give the reason, and nothing of it has been committed.
 #pragma once
 #include <cstdint>

@@ -190,9 +190,9 @@ void divide_rest(World &w, Division &rest) {
   rest.again(w.time, uint32_t(choose_substeps(w.sizes, rest.goal - w.time, w.bound.step)));
 }
 
-// An impact that is too dear ends, and is not begun again. done: sub-steps of this step; returns how many
-// more it needs.
-double end_dear_impact(World &w, StepContext &step, uint32_t done, Division &rest, double more) {
+// An impact that costs too many sub-steps ends, and is not begun again. done: sub-steps of this step; returns
+// how many more it needs.
+double end_costly_impact(World &w, StepContext &step, uint32_t done, Division &rest, double more) {
   if (done + more <= w.def.max_substeps || !end_impact(w)) return more;
   prepare_bound(w);
   step.offered = 0;
@@ -206,7 +206,7 @@ dfm_status follow_bound(World &w, StepContext &step, uint32_t done, Division &re
   update_bound(w);
   if (w.bound.inverted) *trouble |= DFM_TROUBLE_INVERTED;
   const double finer = cut_finer(w.sizes, rest.size(), w.bound.step);
-  const double more = end_dear_impact(w, step, done, rest, rest.left() * finer);
+  const double more = end_costly_impact(w, step, done, rest, rest.left() * finer);
   if (!(done + more <= w.def.max_substeps)) return refuse_rest(w, rest.goal);
   if (!(more > rest.left())) return DFM_OK;
   if (!(w.watch.size_before > 0)) w.watch.size_before = rest.size();
@@ -241,7 +241,7 @@ dfm_status take_substeps(World &w, StepContext &step, double dt, uint32_t n, uin
       begin_impact(w);
       prepare_bound(w);
       divide_rest(w, rest);
-      end_dear_impact(w, step, done, rest, rest.left());
+      end_costly_impact(w, step, done, rest, rest.left());
       *trouble |= DFM_TROUBLE_SUBSTEPS;
       continue;
     }

@@ -56,8 +56,8 @@ double mean_pressure(const Body &b) {
   return 0.5 * sum / h / (side * side);
 }
 
-// Tells of bodies that what touches them presses flat: a heavy body on a soft one. Own weight alone is told
-// when a body is made (world/rest_loads.h).
+// Warns of bodies that what touches them presses flat: a heavy body on a soft one. Own weight alone is
+// reported when a body is made (world/rest_loads.h).
 void warn_squeezed(World &w) {
   for (auto &one : w.bodies) {
     Body &b = *one;
@@ -166,10 +166,10 @@ bool holds(World &w) {
 
 // Sub-steps that count as past where the strain until the next look is more than the bound pays for.
 uint32_t age_at_first(double strain) {
-  const double looks = kBoundStrain / strain;  // until it is spent
-  return looks >= 1 || !(strain > 0)
+  const double checks = kBoundStrain / strain;  // until it is spent
+  return checks >= 1 || !(strain > 0)
              ? 0
-             : kBoundEvery - static_cast<uint32_t>(std::max(1.0, kBoundEvery * looks));
+             : kBoundEvery - static_cast<uint32_t>(std::max(1.0, kBoundEvery * checks));
 }
 
 // Strain of an edge of which one end falls freely for n sub-steps of h while the other is held: the speed

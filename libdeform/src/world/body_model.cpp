@@ -170,17 +170,17 @@ std::vector<double> values_for(const World &w, const Body &b, const dfm_type &ty
 bool take_spare(Body &b, const dfm_type &type, const std::vector<double> &values, MadeModel &out) {
   const ModelOrigin &origin = out.origin;
   const bool turns = rests_unplaced(type);
-  const auto fits = [&](const SpareModel &s) {
+  const auto fits = [&](const CachedModel &s) {
     return s.instance.type == &type && s.requested() == values && s.origin.params == origin.params &&
            s.origin.held == origin.held &&
            (turns || std::memcmp(&s.origin.frame, &origin.frame, sizeof origin.frame) == 0);
   };
-  const auto found = std::find_if(b.spares.begin(), b.spares.end(), fits);
-  if (found == b.spares.end()) return false;
+  const auto found = std::find_if(b.cached_models.begin(), b.cached_models.end(), fits);
+  if (found == b.cached_models.end()) return false;
   found->instance.start();
   out.model.swap(found->instance);
   out.switched_off = std::move(found->switched_off);
-  b.spares.erase(found);
+  b.cached_models.erase(found);
   return true;
 }
 
@@ -235,11 +235,11 @@ void make_selected(World &w, Body &b, const dfm_type &type, std::vector<double> 
   make_instance(w, b, type, values, out);
   if (!w.selection.listed()) return;
   if (!out.switched_off.requested.empty())
-    return drop_fields(type, out.switched_off, out.fields);  // from the spares
+    return drop_fields(type, out.switched_off, out.fields);  // from the cache
   SwitchedOff switched_off{values, differs_by_cell(type, out.fields)};
   std::vector<uint8_t> left = switched_off.by_cell;
   const auto works = [&](const std::string &effect) { return out.model.works(effect); };
-  if (!leave_out(type, out.model.effect_rows(), w.selection, works, values, left)) return;
+  if (!omit_effects(type, out.model.effect_rows(), w.selection, works, values, left)) return;
   for (uint32_t row = 0; row < type.nparam; ++row)
     switched_off.by_cell[row] = switched_off.by_cell[row] && !left[row];
   drop_fields(type, switched_off, out.fields);

@@ -178,7 +178,7 @@ void set_model_params(Body &b, const dfm_params &params) {
   try {
     const auto works = [&](const std::string &effect) { return b.model.works(effect); };
     if (b.world->selection.listed() &&
-        leave_out(type, b.model.effect_rows(), b.world->selection, works, values, by_cell))
+        omit_effects(type, b.model.effect_rows(), b.world->selection, works, values, by_cell))
       set_values(b, values);
     b.switched_off.requested = requested == values && !cells ? std::vector<double>() : requested;
   } catch (...) {

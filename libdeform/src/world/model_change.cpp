@@ -37,7 +37,7 @@ constexpr double kInstant = 1e-9;  // s, too short for any motion
 constexpr double kSlender = 1e-3;  // of the size: less across a line defines no direction
 constexpr double kOnTime = 1e-6;   // of a step: a switch may be early by this share
 constexpr size_t kMaxSwaps = 4096;
-constexpr size_t kSpares = 2;  // a rule has three models
+constexpr size_t kMaxCached = 2;  // a rule has three models
 
 // ---- rigid placement of the body ------------------------------------------------------------------
 
@@ -203,13 +203,13 @@ void judge(World &w, Body &b, const ModelInstance &old, const ChangeBook &book, 
 }
 
 // Keeps an instance for later changes; replaces an older one with the same inputs. There is room.
-void keep_spare(std::vector<SpareModel> &spares, MadeModel &left) {
-  const auto same = [&](const SpareModel &s) {
+void cache_model(std::vector<CachedModel> &cached_models, MadeModel &left) {
+  const auto same = [&](const CachedModel &s) {
     return s.instance.type == left.model.type && s.origin.params == left.origin.params;
   };
-  std::erase_if(spares, same);
-  if (spares.size() == kSpares) spares.erase(spares.begin());
-  spares.push_back({std::move(left.model), std::move(left.origin), std::move(left.switched_off)});
+  std::erase_if(cached_models, same);
+  if (cached_models.size() == kMaxCached) cached_models.erase(cached_models.begin());
+  cached_models.push_back({std::move(left.model), std::move(left.origin), std::move(left.switched_off)});
 }
 
 // The inputs of an instance of this type, at the present state of the body.
@@ -234,7 +234,7 @@ double stable_with(Body &b, MadeModel &made) {
 // A future change, at t or at any time from then on, of a body that has this integrator from then on. named:
 // the change names it.
 void rehearse(Body &b, ModelChoice &to, double t, uint32_t integrator, bool at_rest, bool named,
-              std::vector<SpareModel> &spares) {
+              std::vector<CachedModel> &cached_models) {
   World &w = *b.world;
   const dfm_type &type = w.context->registry.find(DFM_KIND_MODEL, to.type);
   ModelOrigin origin = origin_for(b, type, to);
@@ -254,7 +254,7 @@ void rehearse(Body &b, ModelChoice &to, double t, uint32_t integrator, bool at_r
         type.id);
   // one whose forces do not rotate with the body is valid at the present placement only
   const bool lasts = rests_unplaced(type);
-  if (lasts && spares.size() < kSpares) keep_spare(spares, *made);
+  if (lasts && cached_models.size() < kMaxCached) cache_model(cached_models, *made);
 }
 
 }  // namespace
@@ -294,7 +294,7 @@ void change_model(Body &b, const ModelChoice &to, Swap &swap) {
   swap = {b.handle, w.time, b.model.type, &type, elastic_energy(b), NAN, to.max_jump};
   ChangeBook book = check_changes(b, swap.before);
   const int32_t integrator = static_cast<int32_t>(origin.integrator);
-  b.spares.reserve(kSpares);
+  b.cached_models.reserve(kMaxCached);
   const std::unique_ptr<MadeModel> made = make_body_model(w, b, type, std::move(origin), integrator);
   exchange(b, *made);
   try {
@@ -305,27 +305,27 @@ void change_model(Body &b, const ModelChoice &to, Swap &swap) {
     prepare(w);
   } catch (...) {
     exchange(b, *made);
-    if (!b.rule.empty()) keep_spare(b.spares, *made);  // the rule may use it again
+    if (!b.rule.empty()) cache_model(b.cached_models, *made);  // the rule may use it again
     throw;
   }
   book_change(b, book, swap);
   b.changes = book;
   if (w.step_count == 0) b.first_model = model_hash(b);
-  if (!b.rule.empty()) keep_spare(b.spares, *made);
+  if (!b.rule.empty()) cache_model(b.cached_models, *made);
   wake(w, b);
   w.sizes = {};  // another bound, and other errors
 }
 
 void rehearse(Body &b, std::vector<Switch> &switches, std::vector<SwitchRule> &rule, bool at_rest) {
-  std::vector<SpareModel> spares;
-  spares.reserve(kSpares);
+  std::vector<CachedModel> cached_models;
+  cached_models.reserve(kMaxCached);
   uint32_t integrator = b.origin.integrator;
   const auto one = [&](ModelChoice &to, double t, const std::string &when, bool named = false) {
     if (to.type.empty()) return;
     if (to.integrator != kSameIntegrator) integrator = to.integrator;
     if (!at_rest && is_made_so(b, to) && integrator == b.origin.integrator) return;
     try {
-      rehearse(b, to, t, integrator, at_rest, named, spares);
+      rehearse(b, to, t, integrator, at_rest, named, cached_models);
     } catch (const Error &e) {
       if (e.status == DFM_E_NOMEM) throw;
       const std::string whose = format("body '%s': ", b.name.c_str());
@@ -340,7 +340,7 @@ void rehearse(Body &b, std::vector<Switch> &switches, std::vector<SwitchRule> &r
     one(r.near, b.world->time, "by the rule (near)");
     one(r.far, b.world->time, "by the rule (far)");
   }
-  b.spares.swap(spares);
+  b.cached_models.swap(cached_models);
 }
 
 void check_first_step(World &w, Body &b) {

@@ -15,14 +15,13 @@ void change_model(Body &b, const ModelChoice &to, Swap &swap);
 bool is_made_so(const Body &b, const ModelChoice &c);
 // Makes the models of future changes to detect errors now that do not depend on the state:
 // integrator, springs, cells that a model rejects, effects (if the world has its plan). The instances are
-// kept as spares of the body. at_rest: equilibria will be computed. Results are kept with each change. Throws
-// Error.
+// cached in the body. at_rest: equilibria will be computed. Results are kept with each change. Throws Error.
 void rehearse(Body &b, std::vector<Switch> &switches, std::vector<SwitchRule> &rule, bool at_rest);
 // Tests a model that steps itself with a sub-step of a nanosecond, whose result is discarded: finds what it
 // would refuse in the first step. Throws Error with its reason.
 void check_first_step(World &w, Body &b);
 // Changes the model and keeps the row. Returns false if it was refused because of the energy jump; the row
-// reports that if `tell`.
+// reports that if `report`.
 bool try_change(World &w, Body &b, const ModelChoice &to, bool report);
 // Makes the changes that are due in the step of dt seconds that begins now: by time, then by rules.
 void make_switches(World &w, double dt);

@@ -75,7 +75,7 @@ TEST_P(Cells, MassShares_ArePositiveAndHaveTheCenterOfTheCell) {
   const bool straight = kind.nodes == 10 || kind.nodes == 20;
   const RestMesh &of = straight ? mesh : moved;
   for (size_t c = 0; c < of.cells.size() / kind.nodes; ++c) {
-    double share[kMostNodes], sum = 0, volume = 0;
+    double share[kMaxNodes], sum = 0, volume = 0;
     Vec3 center, mean;
     mass_shares(kind, of.points.data(), &of.cells[kind.nodes * c], share);
     for (uint32_t k = 0; k < kind.nodes; ++k) {
@@ -119,8 +119,8 @@ TEST_P(Cells, Files_GiveBackCellsGroupsAndPoints) {
 TEST(HexahedronShapes, SumToOneAndAreOneAtTheirNodes) {
   for (const uint32_t nodes : {8u, 20u, 27u}) {
     const RestMesh cell = second_order(make_bricks(kMemory, 2, 2, 2, 1));
-    double value[kMostNodes];
-    Vec3 slope[kMostNodes];
+    double value[kMaxNodes];
+    Vec3 slope[kMaxNodes];
     for (uint32_t n = 0; n < nodes; ++n) {
       const Vec3 at = load3(&cell.points[3 * size_t{cell.cells[n]}]) - Vec3{1, 1, 1};
       hexahedron_shapes(nodes, at, value, slope);

@@ -29,7 +29,7 @@ Left left(std::vector<const char *> list, std::vector<double> values,
   const dfm::Registry none;
   const dfm::Selection selection(list.data(), none);
   const auto works = [](const std::string &) { return true; };
-  const bool changed = dfm::leave_out(type, kOff, selection, works, values, by_cell);
+  const bool changed = dfm::omit_effects(type, kOff, selection, works, values, by_cell);
   return {changed, values, by_cell};
 }
 

@@ -43,7 +43,7 @@ struct RigidSet {
 
   Array<dfm_rigid_state> state, next;  // [n] now; at the end of the sub-step
   Array<double> extra, next_extra;     // the host's
-  Array<RigidMotor> motors;            // [njoint] as the host was last told
+  Array<RigidMotor> motors;            // [njoint] as last given to the host
   // [n,6] mean velocity without contact; contact impulse of the last sub-step
   Array<double> velocity, impulse;
   // [n,6] velocity that detection used; the solve starts from the later one

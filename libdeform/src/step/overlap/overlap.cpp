@@ -21,7 +21,7 @@ constexpr uint64_t kReleaseEvery = 16;          // steps: interval at which excl
 constexpr uint64_t kPiece = uint64_t{1} << 63;  // added to ids in Overlaps::placed by place_piece()
 constexpr size_t kSentences = 8;                // number of pairs that the log names individually
 constexpr double kOtherUnits = 100;             // times the size of a body: an obstacle may be in millimeters
-constexpr double kReportAgain = 2;              // times the depth of parts that the log has told
+constexpr double kReportAgain = 2;              // times the depth of parts in the log
 
 // Whether the overlap is too deep for contact to resolve. Closed shapes and voxels resolve any depth;
 // triangles only small ones.

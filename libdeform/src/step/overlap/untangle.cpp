@@ -16,11 +16,11 @@
 namespace dfm {
 namespace {
 
-constexpr int kRounds = 64;  // over all pairs; a heap that is not apart by then has no room
-constexpr int kPolish = 6;   // halvings of the step with which the best direction is sought
+constexpr int kRounds = 64;      // over all pairs; a heap that is not apart by then has no room
+constexpr int kRefinements = 6;  // halvings of the step with which the best direction is sought
 // a body that is not convex may be free after a part of the way past the other's hull
 constexpr int kParts = 16;
-constexpr size_t kMaxLooks = 96;  // at a pair, for such a part
+constexpr size_t kMaxTries = 96;  // at a pair, for such a part
 constexpr double kConvex = 1.5;   // a way past the hull of up to this many depths is taken as it is
 constexpr double kClear = 1.01;   // of d_c: contact starts without a load
 
@@ -139,7 +139,7 @@ class Untangler {
                      [](const Way &l, const Way &r) { return l.length < r.length; });
     // Evenly over all lengths, if there are more than may be tested; the whole ways are among them.
     std::vector<Way> kept;
-    for (size_t i = 0; i < tries.size(); i += tries.size() / kMaxLooks + 1) kept.push_back(tries[i]);
+    for (size_t i = 0; i < tries.size(); i += tries.size() / kMaxTries + 1) kept.push_back(tries[i]);
     kept.push_back(ways.front());
     for (const Way &t : kept)
       if (clear(p, t)) return t;
@@ -175,7 +175,7 @@ class Untangler {
   // A compass search on the sphere of directions.
   Way polished(const OverlapPair &p, Way best) {
     double step = 0.35;
-    for (int k = 0; k < kPolish; step *= 0.5, ++k) {
+    for (int k = 0; k < kRefinements; step *= 0.5, ++k) {
       const Vec3 t = any_tangent(best.direction), u = cross(best.direction, t);
       for (const Vec3 lean : {t, -t, u, -u}) {
         const Vec3 d = normalized(best.direction + step * lean);
@@ -187,13 +187,13 @@ class Untangler {
 
   // Whoever has had to do with what is not apart goes back to its place.
   void restore_positions(const std::vector<OverlapPair> &pairs) {
-    std::vector<uint8_t> stuck(w_.bodies.size(), 0);
+    std::vector<uint8_t> blocked(w_.bodies.size(), 0);
     for (const OverlapPair &p : pairs) {
-      stuck[groups_.root(p.a)] = 1;
-      if (!p.obstacle) stuck[groups_.root(p.b)] = 1;
+      blocked[groups_.root(p.a)] = 1;
+      if (!p.obstacle) blocked[groups_.root(p.b)] = 1;
     }
     for (uint32_t i = 0; i < w_.bodies.size(); ++i)
-      if (stuck[groups_.root(i)]) {
+      if (blocked[groups_.root(i)]) {
         sides_.body(i).shift(-shift_[i]);
         shift_[i] = {};
       }

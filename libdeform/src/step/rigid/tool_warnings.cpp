@@ -17,9 +17,9 @@
 namespace dfm {
 namespace {
 
-constexpr uint32_t kLooks = 16;   // pieces of an edge whose ends are tested
-constexpr double kDeep = 0.02;    // of the smaller one's reach: a smaller depth is not reported
-constexpr uint64_t kSeldom = 16;  // steps between two tests of driven tools against triangles
+constexpr uint32_t kEdgeParts = 16;  // pieces of an edge whose ends are tested
+constexpr double kDeep = 0.02;       // of the smaller one's reach: a smaller depth is not reported
+constexpr uint64_t kSeldom = 16;     // steps between two tests of driven tools against triangles
 
 bool cuts(const World &w, const Obstacle &o) {
   return std::any_of(w.tools.begin(), w.tools.end(),
@@ -48,8 +48,8 @@ double ToolTouch::depth(ToolShape &a, ToolShape &b, bool edges) const {
     if (!a.has_corners() && !b.has_corners() && !own->endless()) look(*other, own->position(), 0);
     if (!edges) continue;
     for (const ToolShape::Edge &e : own->edges())
-      for (uint32_t k = 1; k < kLooks; ++k)
-        look(*other, e.from + (double(k) / kLooks) * (e.to - e.from), own->round());
+      for (uint32_t k = 1; k < kEdgeParts; ++k)
+        look(*other, e.from + (double(k) / kEdgeParts) * (e.to - e.from), own->round());
   }
   return deepest;
 }

@@ -17,7 +17,7 @@ namespace {
 // Share of what a sub-step has paid; a smaller rest is rounding.
 constexpr double kRounding = 1e-9;
 
-// f(body, track, slot of the part) where a tool owes something and still cuts the body.
+// f(body, track, slot of the part) where energy of a cut remains and the tool still cuts the body.
 template <class F>
 void each_debt(World &w, F &&f) {
   if (w.tools.empty() || w.prescribed.is_static()) return;

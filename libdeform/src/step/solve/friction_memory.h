@@ -21,10 +21,11 @@ void follow_load(World &w, StepContext &step);
 // surfaces about the normal.
 void turn_frames(World &w, StepContext &step);
 
-// Before the solves: nothing is owed yet. Without laws that hold places StepContext::stick_drift is empty.
+// Before the solves: no slip is to be taken back yet. Without laws that hold places StepContext::stick_drift
+// is empty.
 void reset_stick_drift(const World &w, StepContext &step);
-// Once the tolerances of an island are known: part of what its contacts owe is added to the slip that the
-// solve makes zero.
+// Once the tolerances of an island are known: part of the slip error of its contacts is added to the slip
+// that the solve makes zero.
 void find_slip_back(const World &w, StepContext &step, SolveIsland &own);
 // After the island's solve: its rows give the slip of the surfaces again.
 void restore_drive(StepContext &step, const SolveIsland &own);

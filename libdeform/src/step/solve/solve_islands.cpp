@@ -28,7 +28,7 @@ double start_residual(const StepContext &step, const SolveIsland &own) {
   double most = 0;
   each_row(own.part.contacts, [&](uint32_t i) {
     for (const size_t k : {2 * size_t{i}, 2 * size_t{i} + 1})
-      if (sides[k] != kNone) most = std::max(most, step.disturbance[2 * size_t{sides[k]} + 1]);
+      if (sides[k] != kNone) most = std::max(most, step.start_residual[2 * size_t{sides[k]} + 1]);
   });
   each_row(own.part.bonds, [&](uint32_t i) { most = std::max(most, norm(bond_residual(step.rows, i))); });
   return most;
@@ -125,7 +125,7 @@ void solve_island(const World &w, StepContext &step, SolveIsland &own) {
                                normal};
   const auto allow = [&] {
     set_tolerance(step.rows, own.part, step.contacts, step.h, bounds, step.solve_islands->sides(),
-                  step.disturbance.data(), own.tolerance);
+                  step.start_residual.data(), own.tolerance);
     // static mode: the start, a guess with the last forces, is no measure of what a bond may be off by
     if (w.prescribed.is_static()) own.tolerance.bond = least;
   };
@@ -306,7 +306,7 @@ const SolveIsland *solve_islands(World &w, StepContext &step) {
   const size_t n = step.rows.n;
   step.tolerance.normal.resize(n);
   step.tolerance.tangent.resize(n);
-  step.disturbance.assign(2 * (w.bodies.size() + (step.rows.rigid.empty() ? 0 : step.rows.ndof)), 0.0);
+  step.start_residual.assign(2 * (w.bodies.size() + (step.rows.rigid.empty() ? 0 : step.rows.ndof)), 0.0);
   const std::span<SolveIsland> all = step.solve_islands->all();
   uint64_t rows = 0;
   for (SolveIsland &own : all) {
@@ -332,7 +332,7 @@ const SolveIsland *solve_islands(World &w, StepContext &step) {
   for (SolveIsland &own : all)
     if (own.open && !own.bad)
       find_disturbance(step.rows, own.part, step.state, step.h, step.solve_islands->sides(),
-                       step.disturbance.data());
+                       step.start_residual.data());
   run([&](SolveIsland &own) {
     solve_island(w, step, own);
     limit_work(step, own);

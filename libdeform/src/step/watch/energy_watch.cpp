@@ -21,7 +21,7 @@ namespace {
 constexpr uint32_t kEvery = 512;
 // So one check in this many sub-steps costs less than 1 %.
 constexpr uint32_t kEvaluationCost = 256;
-// Share of the energy of the kick: stiff modes return a third of it on average as they calm down, and a check
+// Share of the energy of the kick: stiff modes return a third of it on average as they decay, and a check
 // sees it at one instant.
 constexpr double kReturned = 0.5;
 // Stiff modes whose energy is all motion show it in the kick within a quarter of their period: the base is
@@ -114,7 +114,7 @@ bool check_sums(const World &w, const StepContext &step, const Body &b, EnergySa
 }
 
 // The energy that the scheme keeps, U(x) - F.x + v.M v_free / 2, and half of the energy of the kick, by which
-// it may rise as stiff modes calm down. U of a body that flows is that after the flow at x: what flow
+// it may rise as stiff modes decay. U of a body that flows is that after the flow at x: what flow
 // dissipates is still in U until the sub-step is committed.
 bool look(World &w, const StepContext &step, Body &b, EnergySample &out) {
   if (check_sums(w, step, b, out)) return true;
@@ -161,10 +161,10 @@ bool look(World &w, const StepContext &step, Body &b, EnergySample &out) {
 
 // Each body by itself.
 void sum_energies(World &w, StepContext &step) {
-  step.looks.resize(step.active.size());
+  step.samples.resize(step.active.size());
   each_on(&w.context->tasks, step.active.size(), 1, [&](size_t k) {
     Body &b = *w.bodies[step.active[k]];
-    step.looks[k].known = watched(b) && look(w, step, b, step.looks[k]);
+    step.samples[k].known = watched(b) && look(w, step, b, step.samples[k]);
   });
 }
 
@@ -364,7 +364,7 @@ Balance take_balance(World &w, StepContext &step) {
   sum_energies(w, step);
   for (size_t k = 0; k < step.active.size(); ++k) {
     Body &b = *w.bodies[step.active[k]];
-    const EnergySample &now = step.looks[k];
+    const EnergySample &now = step.samples[k];
     if (!now.known) continue;
     EnergyBook &e = b.energy;
     out.total += now.kinetic + now.elastic;
