@@ -146,7 +146,12 @@ BAD = {
                   "=![b](../images/b.png)\n\n`libdeform/doc/images/d.py`\n")],
     "reading_order": [("libdeform/doc/concepts/new.md", "=# New\n"),
                       ("libdeform/doc/decisions/0002-more.md", "=# 0002 More\n"),
-                      ("libdeform/doc/decisions/0001-handles.md", "=" + "word " * 1201)],
+                      ("libdeform/doc/decisions/0001-handles.md", "=" + "word " * 1201),
+                      ("CHANGELOG.md", "=" + "word " * 3001),
+                      ("libdeform/doc/README.md", "word " * 120000)],
+    "results": [("tests/bench/results/gone.csv", "=a,b\n")],
+    "stages": [("libdeform/src/step/a.cpp", "=bool stage_a(World &w);\nbool stage_b(World &w) { return "
+                                            "stage_a(w); }\n")],
     "layers": [("libdeform/src/core/error.h", '#include "math/vec3.h"\n'),
                ("libdeform/src/broad/tree.cpp", '#include "narrow/pair.h"\n'),
                ("libdeform/src/broad/tree.cpp", '#include "../core/error.h"\n'),

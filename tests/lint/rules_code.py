@@ -211,6 +211,16 @@ def systems(tree):
                        "names are UTF-8 on every system: path_of(name), name_of(path)")
 
 
+def stages(tree):
+    """No stage of a sub-step calls another one: step.cpp alone has their order."""
+    code = {path: without_comments(tree.text(path)) for path in tree.select(SRC + "step/")}
+    names = {name for text in code.values() for name in re.findall(r"\b(?:bool|Next) (stage_\w+)\(", text)}
+    for path, text in code.items():
+        for match in re.finditer(r"(?<!bool )(?<!Next )\b(stage_\w+)\(", text):
+            if match.group(1) in names and not path.endswith("/step.cpp"):
+                yield path, line_of(text, match.start()), f"calls {match.group(1)}: return Next, or a reason"
+
+
 RULES = {"layers": layers, "public_only": public_only, "systems": systems, "plugin_includes": plugin_includes,
-         "third_parties": third_parties,
+         "third_parties": third_parties, "stages": stages,
          "numbers": numbers, "libm": libm, "kernels": kernels}

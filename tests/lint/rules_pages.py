@@ -9,6 +9,7 @@ from tree import CODE, line_of
 PAGES = "libdeform/doc/"
 HISTORY = (PAGES + "decisions/",)  # may name pages that are gone
 SUBJECT_WORDS = 1200  # of a page of decisions
+CHANGE_WORDS, ALL_WORDS = 3000, 120000  # of the change log, of all pages with it
 
 
 def slugs(text):
@@ -55,7 +56,7 @@ def citations(tree):
 
 
 def reading_order(tree):
-    """Every page is in the list of pages; a page of decisions is a subject of theirs, and short."""
+    """Every page is in the list of pages; a page of decisions is a subject of theirs; all are short."""
     order = PAGES + "README.md"
     if order not in tree.paths:
         return
@@ -75,6 +76,20 @@ def reading_order(tree):
         words = len(tree.text(path).split())
         if words > SUBJECT_WORDS:
             yield path, 1, f"has {words} words, a subject at most {SUBJECT_WORDS}; drop what no longer holds"
+    changes = len(tree.text("CHANGELOG.md").split())
+    if changes > CHANGE_WORDS:
+        yield "CHANGELOG.md", 1, f"has {changes} words, at most {CHANGE_WORDS}; drop what users need not know"
+    words = changes + sum(len(tree.text(path).split()) for path in tree.select(PAGES, ext=(".md",)))
+    if words > ALL_WORDS:
+        yield order, 1, f"all pages have {words} words of at most {ALL_WORDS}; take out what you put in"
+
+
+def results(tree):
+    """A page names every table of figures."""
+    said = "".join(tree.text(path) for path in tree.select("", ext=(".md",)))
+    for path in tree.select("tests/bench/results/", ext=(".csv",)):
+        if path.rpartition("/")[2] not in said:
+            yield path, 1, "is in no page: name it beside its figures, or delete it"
 
 
 def pictures(tree):
@@ -189,4 +204,4 @@ def fuzzers(tree):
 
 RULES = {"fuzzers": fuzzers, "walks": walks, "names": names, "scene_keys": scene_keys, "shipped": shipped,
          "links": links, "citations": citations,
-         "reading_order": reading_order, "pictures": pictures}
+         "reading_order": reading_order, "pictures": pictures, "results": results}
