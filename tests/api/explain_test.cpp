@@ -69,12 +69,39 @@ TEST(Explain, Step_ReportsWhetherStiffnessOrDampingBoundsIt) {
   const std::string heavy = damped("heavy", R"("mass": 1e6)");
   EXPECT_NE(stiff.find("the stiffest point for its mass"), std::string::npos) << stiff;
   EXPECT_NE(stiff.find("soften or coarsen"), std::string::npos) << stiff;
-  EXPECT_NE(slow.find("the lag of the dampers bound it"), std::string::npos) << slow;
+  EXPECT_NE(slow.find("the lag of the dampers bound it (a lag of "), std::string::npos) << slow;
   EXPECT_NE(heavy.find("damping bounds it"), std::string::npos) << heavy;
   EXPECT_NE(slow.find("lower its damping"), std::string::npos) << slow;
   EXPECT_NE(heavy.find("lower the damping"), std::string::npos) << heavy;
   for (const std::string &out : {slow, heavy}) {
     EXPECT_EQ(out.find("stiffest"), std::string::npos) << out;
+  }
+}
+
+// Mass may move between the points of a body that nothing divides: what is offered is accepted.
+TEST(Explain, MassScaling_IsOfferedWhereItIsAccepted) {
+  const std::string path = scene("offered", R"("materials": {"m": {"young": 1e4}},
+      "bodies": [{"name": "liver", "mesh": ")" DEFORM_SOURCE_DIR
+                                            R"(/examples/data/liver.msh", "material": "m",
+                  "model": {"type": "msm"}}],
+      "tools": [{"name": "knife", "shape": "blade", "half_size": [0.001, 0.1, 0.1],
+                 "pose": {"position": [1, 0, 0]}}])");
+  const std::vector<std::string> divides = {
+      "/tools/0/cuts=[\"liver\"]", "/materials/m/tear=0.5", "/bodies/0/separate={\"least_cells\":2}",
+      R"(/cuts=[{"body":"liver","t":1,"shape":"plane","point":[0,0,0],"normal":[1,0,0]}])"};
+  const auto explained = [&](const std::vector<std::string> &changes) {
+    std::vector<std::string> args = {"explain", path};
+    for (const std::string &c : changes) args.insert(args.end(), {"--set", c});
+    return test::deform(args);
+  };
+  const std::string take = "/bodies/0/mass_scaling=0.01", offer = "\"mass_scaling\": 0.01 would allow";
+  EXPECT_NE(explained({}).out.find(offer), std::string::npos) << explained({}).out;
+  EXPECT_EQ(explained({take}).exit_code, 0);
+  for (const std::string &by : divides) {
+    const test::CommandResult before = explained({by});
+    EXPECT_EQ(before.exit_code, 0) << before.err;
+    EXPECT_EQ(before.out.find("mass_scaling"), std::string::npos) << before.out;
+    EXPECT_NE(explained({by, take}).err.find("can be neither cut nor torn"), std::string::npos) << by;
   }
 }
 

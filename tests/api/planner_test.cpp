@@ -298,12 +298,32 @@ TEST_F(PlannerScene, TargetThatCannotBeMet_IsReportedByRunAndExplain) {
   EXPECT_FALSE(has(reported.out, "  chosen: ")) << reported.out;
 }
 
-// A silicone finger whose explicit steps would be 2 us.
+// Dampers with a lag are what bounds the sub-steps of the world, and what the planner takes for them.
+TEST_F(PlannerScene, ExplicitStepsOfADampedBody_AreThoseThatTheWorldTakes) {
+  const std::string path =
+      bar(R"("accuracy": {"target": 0.4},)", R"("model": {"type": "corotational_fem"}, "lattice": null, )",
+          R"(, "integrator": "symplectic_euler")");
+  for (const char *damping : {"2e-5", "2e-4", "2e-3", "2e-2"}) {
+    const test::CommandResult r = test::deform(
+        {"explain", path, "--json", "--set", std::string("/materials/gel/damping/stiffness=") + damping});
+    ASSERT_EQ(r.exit_code, 0) << r.err;
+    const auto after = [&](const char *key, size_t from) {
+      const size_t at = r.out.find(key, from);
+      return at == std::string::npos ? 0.0 : std::strtod(r.out.c_str() + at + std::strlen(key), nullptr);
+    };
+    const double planned = after("\"substep_s\":", r.out.find("\"predicted\":")),
+                 taken = after("\"stable_s\":", 0);
+    EXPECT_GT(planned, taken / 1.5) << damping;
+    EXPECT_LT(planned, taken * 1.5) << damping;
+  }
+}
+
+// A silicone finger that is damped so much that its explicit steps would be 3 us.
 TEST_F(PlannerScene, StiffFingerUnderAProbe_MovesImplicitly) {
   const std::string path = folder() + "/finger.json";
   test::write_file(path, R"({"format": "deform-scene", "version": 1, "time": {"duration": 0.5},
  "accuracy": {"target": 0.05, "quantity": "tip"},
- "materials": {"silicone": {"density": 1070, "young": 2e5, "poisson": 0.4, "damping": {"stiffness": 0.003}}},
+ "materials": {"silicone": {"density": 1070, "young": 2e5, "poisson": 0.4, "damping": {"stiffness": 0.03}}},
  "bodies": [{"name": "finger", "material": "silicone", "lattice": null,
    "mesh": {"make": "beam", "size": [0.1, 0.02, 0.02], "cells": 2000},
    "fix": [{"box": [[-1, -1, -1], [1e-6, 1, 1]]}]}],

@@ -15,9 +15,6 @@ constexpr double kNotGiven = -1;  // J, of a part: no kinetic energy is that
 constexpr double kMoved = 1e-4;   // of the shortest edge: a difference of forces is that of their derivatives
 // Strain of an edge from which on nothing of the spectrum at rest counts.
 constexpr double kUnlikeRest = 0.5;
-// Dampers with a lag are at most so stiff, relative to the springs beside them: half the step that these
-// allow. At the body's own frequency and decay they see a velocity that is off by so much at most.
-constexpr double kStiffening = 3, kError = 0.02;
 constexpr double kNoDrag = 1e-6;  // of row sums of damping: rounding
 
 FreeMotion free_motion_of(Phyxels &p, const double *gravity, double h) {
@@ -149,12 +146,7 @@ double ExplicitPoints::find_lag(Trial &rest, double edge) {
   if (!(frequency >= 0) || !row_sums(rest.kin, cell)) return 0;
   for (uint32_t i = 0; i < p_.n; ++i)
     if (stiffness_[i] > 0) ratio = std::max(ratio, (damping_[i] - drag(i)) / stiffness_[i]);
-  if (!(ratio > 0)) return 0;
-  // they see 1 / (1 + 2 (s lag)^2 / (1 + 2 s lag)) of a velocity that varies by e^st
-  // and of the roots s of s^2 + ratio w^2 s + w^2 the larger is w in size until they are real
-  const double damped = std::max(1.0, 0.5 * ratio * frequency);
-  const double rate = frequency * (damped + std::sqrt(damped * damped - 1));
-  return std::min(ratio / kStiffening, std::sqrt(0.5 * kError) / rate);
+  return ratio > 0 ? damper_lag(ratio, frequency) : 0;
 }
 
 // s, stable sub-step at rest; 0: the model fails.

@@ -17,6 +17,7 @@
 #include "world/body_model.h"
 #include "world/create.h"
 #include "world/idle.h"
+#include "world/may_cut.h"
 
 namespace dfm {
 namespace {
@@ -63,7 +64,8 @@ std::string integrator(const Body &b) {
   return out + "}";
 }
 
-// Which point bounds explicit sub-steps at rest, how many nearly do, and what mass_scaling would give.
+// Which point bounds explicit sub-steps at rest, how many nearly do, and what mass_scaling would give a body
+// that nothing divides.
 std::string light(const Body &b) {
   RestRows rows;
   if (!rest_rows(b, b.integrator.share, rows)) return "";
@@ -77,8 +79,9 @@ std::string light(const Body &b) {
   std::vector<std::string> scaled;
   if (!rest_rows(b, 1, rows)) return "";
   std::vector<double> mass;
+  const bool divided = b.tears || b.separate.on || cut_by_any(b) || !b.planned_cuts.empty();
   for (const double share : {0.001, 0.01, kMaxScaled})
-    if (b.scaling.moved == 0)
+    if (b.scaling.moved == 0 && !divided)
       scaled.push_back(format("{\"mass_scaling\":%g,\"step_s\":%.4g}", share,
                               kBoundShare * scale_mass(b.p, rows, share, mass).step));
   return format(",\"light\":{\"point\":%u,\"at\":[%.6g,%.6g,%.6g],\"step_s\":%.4g,\"below_twice\":%u", worst,
@@ -251,7 +254,8 @@ std::string reason(const World &w) {
   const std::string stiffness = seconds(share * bound.by_stiffness);
   const std::string damping = seconds(share * bound.by_damping);
   if (bound.lagged)
-    return "0.9 of the bound: stiffness and the lag of the dampers bound it (without damping " + stiffness +
+    return "0.9 of the bound: stiffness and the lag of the dampers bound it (a lag of " +
+           seconds(b.p.dampers.lag) + "; without damping " + stiffness +
            "); soften or coarsen this body, or lower its damping" + cut;
   return "0.9 of the bound: " +
          (bound.by_damping < bound.by_stiffness

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "dynamics/symplectic_euler.h"
 
 namespace dfm {
 namespace {
@@ -122,13 +123,20 @@ double time_error(Scheme scheme, bool steps_itself, double h, const BodyRegime &
   return at_most(std::max(share * at_most(oscillation, 1), rebound) + event, 1);
 }
 
-// s. With h0 = 2/w the proven step of the stiffest mode without damping, h^2 w^2 + 2 h beta w^2 <= 4
-// (doc/concepts/step.md) leaves h = sqrt(h0^2 + beta^2) - beta.
+// s, by the stiffest mode, whose step without damping is h0 = 2/w. As in explicit bodies, dampers see the
+// velocity or a lag of it, whichever allows more (doc/concepts/step.md). A uniform strain along a block has
+// the frequency sqrt(12) c / L.
 double explicit_step(const MeasuredModel &m, const BodyRegime &b) {
   const double nu = std::min(std::max(b.poisson, 0.0), 0.49);
   const double pressure = std::sqrt(b.young * (1 - nu) / ((1 + nu) * (1 - 2 * nu)) / b.density);
-  const double h0 = cells_of(m, b).wave_steps * b.cell_size / pressure, beta = b.damping_stiffness;
-  return kOffered * h0 * h0 / (std::sqrt(h0 * h0 + beta * beta) + beta);
+  const double h0 = cells_of(m, b).wave_steps * b.cell_size / pressure, w2 = 4 / (h0 * h0);
+  const double beta = b.damping_stiffness;
+  double h = stable_step(w2, b.damping_mass + beta * w2, 1);
+  if (beta > 0) {
+    const double lag = damper_lag(beta, std::sqrt(12 * b.young / b.density) / b.length);
+    h = std::max(h, stable_step(w2 * (1 + beta / lag), b.damping_mass, 1));
+  }
+  return kOffered * h;
 }
 
 double cpu_per_s(const MeasuredModel &m, Scheme own, double h, const BodyRegime &b) {
