@@ -2,8 +2,8 @@
 #include "support.h"
 #include "world.h"
 
-// The impulses of the last sub-step hold it, so that there is nothing left to sweep for: one sweep finds that.
-// Others sweep when a contact comes or goes.
+// The impulses of the last sub-step hold it, so that there is nothing left to sweep for: one sweep finds
+// that. Others sweep when a contact comes or goes.
 TEST(RestingStack, MostSubSteps_TakeOneSweep) {
   const test::Context c;
   const dfm_world w = test::make_world(c);

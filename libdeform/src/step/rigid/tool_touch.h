@@ -16,9 +16,9 @@
 //            impulses and the state of the law last from sub-step to sub-step (World::tool_store)
 //   jaws     follow their angle exactly, so the force on what two of them hold would have no bound. What a
 //            jaw touches turns it about its hinge by moment over stiffness, at the end of the sub-step (a
-//            spring without mass, backward Euler). Its face yields as well, by a hundredth of a millimeter per
-//            newton; otherwise it would be undefined how rigid things share a load. Jaws of a tool without a
-//            coupling pass through obstacles, as the tool does
+//            spring without mass, backward Euler). Its face yields as well, by a hundredth of a millimeter
+//            per newton; otherwise it would be undefined how rigid things share a load. Jaws of a tool
+//            without a coupling pass through obstacles, as the tool does
 //   joints   bodies that joints connect are one group, whose response contains the joints (tool_joints.cpp)
 //   order    The rows are part of the one contact problem of a sub-step (step/solve/solve.cpp). What turning
 //            adds and motors depend on its solution: follow() updates them, and the solve goes on

@@ -57,7 +57,7 @@ bool fill_responses(World &w, StepContext &step, uint32_t *trouble) {
 constexpr double kWhole = 2.5;
 constexpr uint32_t kMaxRevisions = 12;  // of the responses of rigid hosts, within a sub-step
 // m/s, at which a depth opens that a pair was found with.
-constexpr double kRecoverySpeed = 8e-4;
+constexpr double kRecoverySpeed = 7e-4;
 
 // m, what was left of the depth that the pair was found with; `most` if it is found now.
 double left_of_pair(const ContactStore &store, uint64_t a, uint64_t b, double most) {
