@@ -6,6 +6,7 @@
 #include <thread>
 #include <utility>
 
+#include "deform/scene.h"
 #include "rigid.h"
 #include "stack.h"
 
@@ -284,6 +285,29 @@ TEST(Budget, OfTooLittleTime_EndsTheStepEarly) {
   test::ok(dfm_world_step(b.world, kStep, &trouble));
   EXPECT_FALSE(trouble & DFM_TROUBLE_BUDGET);
   EXPECT_EQ(dfm_world_set_budget(b.world, -1, 0), DFM_E_ARG);
+}
+
+// Twenty toys that fall on each other, with budgets that a frame exceeds: every step advances the world, so
+// that the next one meets another state.
+// unsanitized: too slow there; shorter tests run the same code
+TEST(Budget, OfTwentyToys_AdvancesInEveryStep) {
+  const std::string path = std::string(DEFORM_SOURCE_DIR) + "/tests/bench/toys.json";
+  for (const auto &[seconds, work] : {std::pair(4e-3, uint64_t{0}), std::pair(0.0, uint64_t{200000})}) {
+    test::Context context;
+    dfm_scene scene = 0;
+    test::ok(dfm_scene_open(context, path.c_str(), nullptr, &scene));
+    dfm_world w = 0;
+    test::ok(dfm_scene_world(scene, &w));
+    test::ok(dfm_world_set_budget(w, seconds, work));
+    for (int k = 0; k < 60; ++k) {
+      const double before = dfm_world_time(w);
+      test::ok(dfm_world_step(w, 1.0 / 60, nullptr));
+      EXPECT_GT(dfm_world_time(w), before) << k << ", " << seconds << " s, " << work << " units";
+    }
+    EXPECT_EQ(test::stats(w).discarded, 0u);
+    EXPECT_GT(test::stats(w).contacts_max, 0u);
+    test::ok(dfm_scene_close(scene));
+  }
 }
 
 // One sub-step of three thrown chains may take most of a second.

@@ -49,6 +49,18 @@ TEST(TwoCylinders, CoarsePair_StaysWithFrictionAndFallsWithout) {
   EXPECT_LT(without.last("upper").com[2], 0.3);
 }
 
+// The landing of the coarse pair in implicit steps of 1/60 s, where contact has to carry the load itself.
+// unsanitized: too slow there; shorter tests run the same code
+TEST(TwoCylinders, CoarsePairOfFiniteElements_ImplicitAt60Hz_IsSolved) {
+  std::vector<std::string> arguments = {"--time", "0.4", "--set", "/time/step=0.016666666666666666"};
+  for (const char *body : {"/bodies/0", "/bodies/1"})
+    for (const char *change : {R"(/model={"type": "corotational_fem"})", "/integrator=implicit_euler"})
+      arguments.insert(arguments.end(), {"--set", std::string(body) + change});
+  const test::SceneRun run("two_cylinders_coarse", arguments);
+  run.expect_valid(20, "implicit");
+  EXPECT_EQ(run.number("unconverged_steps"), 0);
+}
+
 // soak: long; scene_table_test has its landing, WithFriction the rest
 TEST(TwoCylinders, FinePair_TouchesAtSixtyContactsAndMore) {
   const test::SceneRun run("two_cylinders_fine", {"--time", "1.2"});

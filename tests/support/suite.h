@@ -130,6 +130,9 @@ class Expectations {
     if (seen.stats.contacts_max < get("least_contacts", 0))
       say("%u contacts at once at most: the scene does not do what it is for", seen.stats.contacts_max);
     if (seen.status != DFM_OK) return out;
+    if (seen.stats.unconverged)
+      say("%llu of %llu sub-steps are not solved", static_cast<unsigned long long>(seen.stats.unconverged),
+          static_cast<unsigned long long>(seen.stats.substeps));
     const double speed = get("rest_speed", HUGE_VAL);
     if (seen.speed_last > speed)
       say("the fastest point moves with %g m/s at the end, at most %g", seen.speed_last, speed);

@@ -273,7 +273,7 @@ void guard_pairs(GuardScene &scene, const Array<Candidate> &list, std::span<cons
     const double share = floor_share(scene, f), floor = share * scene.floor, margin = share * scene.margin;
     if (!(share > 0) || pair.far_apart(floor) || pair.plane_apart(floor)) continue;
     const auto touch = [&](double d, double within) { return pair.touch(d, within); };
-    if (narrow::judge(touch, [&] { return pair.distance(0); }, floor, margin, hit)) out.push_back(hit);
+    if (narrow::judge(touch, [&] { return pair.start(); }, floor, margin, hit)) out.push_back(hit);
   }
 }
 

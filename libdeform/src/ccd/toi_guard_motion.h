@@ -100,6 +100,15 @@ struct PairMotion {
     return (edges ? distance_edge_edge(m, m + 2, t) : distance_point_triangle(m[0], m + 1, t)) - round;
   }
 
+  // At the start. What places round to is no distance: features that were laid on each other touch.
+  double start() const {
+    double most = 0;
+    for (const dfm_motion &of : m)
+      for (const double x : of.p0) most = std::max(most, std::fabs(x));
+    const double found = distance(0);
+    return found > 0x1p-50 * most ? found : 0;
+  }
+
   // The plane of the triangle (or along both edges) at the start separates them up to the end: heights over
   // it change linearly.
   bool plane_apart(double floor) const {

@@ -197,7 +197,8 @@ bool ContactNewton::frozen_steps() {
         at_low = now;
       }
       const double ratio = std::isfinite(at_high) ? at_low / (at_low - at_high) : 0.5;
-      share = low + std::clamp(trial % 3 == 2 ? 0.5 : ratio, 0.05, 0.95) * (high - low);
+      share =
+          low + std::clamp(trial % Set::rounds == Set::rounds - 1 ? 0.5 : ratio, 0.05, 0.95) * (high - low);
     }
     current_ = known_ && is_linear();
     // no such place: there is a jump in a law, at which steps would stay

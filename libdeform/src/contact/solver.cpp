@@ -18,7 +18,7 @@ void set_trial(const ContactRows &rows, const RowsPart &part, double h, const do
     // opens and closes would lose its friction in every other pass.
     const double wn = rows.wn[i], *const compliance = &rows.compliance[size_t(i) * 3];
     const auto closing = [&] { return normal_impulse(l[0], u.x + rows.rate[i], wn, compliance); };
-    s.fn[i] = wn > 0 ? std::max(l[0] > 0 ? l[0] : closing(), 1e-6 / wn) / h : 0;
+    s.fn[i] = wn > 0 ? std::max(l[0] > 0 ? l[0] : closing(), SolveSettings::at_rest / wn) / h : 0;
     s.vt[i] = s.slip[i] = u.y;
     s.vt[s.stride + i] = s.slip[s.stride + i] = u.z;
     const double wt = response[i];

@@ -131,12 +131,11 @@ bool rigid_response(World &w, StepContext &step, const ContactRows::Block &block
 void start_rigids(World &w, StepContext &step) {
   for (const ContactRows::Block &block : step.rows.blocks) {
     if (block.group == kNone) continue;
-    const bool alone = block.group >= step.rigid_groups.size();
     double *to = &step.rows.y[4 * size_t{block.first}];
     for (const auto &[set, body] : step.tools->members(step, block.group)) {
       const size_t at = 6 * size_t{body};
       double now[6];
-      if (!step.tools->free_velocity(*set, body, alone, now)) std::copy_n(&set->velocity[at], 6, now);
+      if (!step.tools->free_velocity(*set, body, now)) std::copy_n(&set->velocity[at], 6, now);
       store3(to, load3(now) - load3(&set->first[at]));
       store3(to + 4, load3(now + 3) - load3(&set->first[at + 3]));
       to += 8;

@@ -1,4 +1,4 @@
-// Jaws of tools: they follow their angle, and yield about their hinge to what is rigid.
+// Jaws of tools: they follow their angle, and yield about their hinge to what they touch.
 #include <algorithm>
 
 #include "dynamics/rigid/rigid_set.h"
@@ -15,18 +15,13 @@ constexpr double kJaw = 1e4;  // N/m, of a jaw at its tip
 }  // namespace
 
 // The hinge is the origin of part 0, about its y.
-void ToolTouch::list_jaws(Moved &m, uint32_t groups) {
+void ToolTouch::list_jaws(Moved &m) {
   const dfm_rigid_state &frame = m.set->state[0];
   const Vec3 axis = rotate(load_quat(frame.rotation), {0, 1, 0});
   for (uint32_t i = 1; i < m.set->defs.size(); ++i) {
     const Vec3 arm = load3(m.set->state[i].position) - load3(frame.position);
     const double length = 2 * m.set->defs[i].half_size[2];
-    uint32_t alone = kNone;
-    if (!responds({size_t(&m - sides_.data()), i, {}, {}})) {
-      alone = groups + static_cast<uint32_t>(alone_.size());
-      alone_.push_back({m.set, i});
-    }
-    m.jaws.push_back({i, axis, cross(axis, arm), 1 / (h_ * h_ * kJaw * length * length), alone});
+    m.jaws.push_back({i, axis, cross(axis, arm), 1 / (h_ * h_ * kJaw * length * length)});
   }
 }
 
@@ -51,31 +46,20 @@ void ToolTouch::straighten(Moved &m) const {
   }
 }
 
-// N m s about its hinge: of all that touches it, or, of a jaw alone, of what is rigid.
-double ToolTouch::moment_of(size_t tool, const Moved::Jaw &jaw) const {
-  const auto about = [&](Vec3 p, Vec3 m) { return dot(jaw.lever, p) + dot(jaw.axis, m); };
-  const double *const all = &sides_[tool].set->impulse[6 * size_t{jaw.part}];
-  if (jaw.alone == kNone) return about(load3(all), load3(all + 3));
-  double sum = 0;
-  for (const Row &row : rows_)
-    for (const Side *side : {&row.a, &row.b}) {
-      if (side->tool != tool || side->part != jaw.part) continue;
-      const Vec3 p = side == &row.a ? row.given() : -row.given();
-      sum += about(p, cross(side->arm, p));
-    }
-  return sum;
+// rad/s, by the impulses of the sub-step.
+double ToolTouch::rate_of(const Moved &m, const Moved::Jaw &jaw) {
+  const double *const p = &m.set->impulse[6 * size_t{jaw.part}];
+  return jaw.softness * (dot(jaw.lever, load3(p)) + dot(jaw.axis, load3(p + 3)));
 }
 
 void ToolTouch::turn_jaws() {
-  for (size_t tool = 0; tool < sides_.size(); ++tool)
-    for (const Moved::Jaw &jaw : sides_[tool].jaws) {
-      const Moved &m = sides_[tool];
-      const double moment = moment_of(tool, jaw);
-      if (moment == 0) continue;
+  for (const Moved &m : sides_)
+    for (const Moved::Jaw &jaw : m.jaws) {
+      const double rate = rate_of(m, jaw);
+      if (rate == 0) continue;
       const dfm_rigid_state &frame = m.set->next[0];
       dfm_rigid_state &s = m.set->next[jaw.part];
       const Vec3 axis = rotate(load_quat(frame.rotation), {0, 1, 0});
-      const double rate = jaw.softness * moment;
       const Quat by = turned(Quat{}, h_ * rate * axis);
       const Vec3 arm = load3(s.position) - load3(frame.position), now = rotate(by, arm);
       store3(s.position, load3(frame.position) + now);

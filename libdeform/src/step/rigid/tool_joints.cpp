@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "body/obstacle_mesh.h"
+#include "contact/solve_settings.h"
 #include "dynamics/rigid/rigid_set.h"
 #include "math/turn.h"
 #include "state/obstacle.h"
@@ -17,9 +18,8 @@
 namespace dfm {
 namespace {
 
-constexpr double kHeld = 1e-9;     // of the answer without joints: less is rounding, joints allow no motion
-constexpr double kStronger = 0.1;  // of what a place yields where a motor holds that is not at its limit yet
-constexpr double kMaxStrong = 1e-6;  // of it: no place gives less
+constexpr double kHeld = 1e-9;       // of the answer without joints: less is rounding, joints allow no motion
+constexpr double kMaxStrong = 1e-6;  // of the answer without joints: no place gives less
 constexpr double kDriven = 0.01;     // sine: a motor moves a place along a direction
 
 bool is_moved(const RigidSet &set, uint32_t body) { return set.group[body] != DFM_RIGID_STILL; }
@@ -175,7 +175,7 @@ bool ToolTouch::press_harder() {
           rows_.begin(), rows_.end(),
           [](const Row &row) { return !row.pair->jaw && row.soft > 0 && row.impulse > 0; }))
     return false;
-  strong_ *= kStronger;
+  strong_ /= SolveSettings::penalty;
   begin_passes();
   return true;
 }

@@ -23,22 +23,11 @@ const ToolTouch::Moved *ToolTouch::known(const RigidSet &set) const {
   return at == sides_.end() ? nullptr : &*at;
 }
 
-// Whether impulses on this side move its group.
-bool ToolTouch::responds(const Side &side) const {
-  const Moved &m = sides_[side.tool];
-  if (!m.set || !m.responds) return false;
-  const uint32_t g = m.set->group[side.part];
-  return g != DFM_RIGID_STILL && m.first[g] != kNone;
-}
-
-// A jaw of a tool that does not answer impulses moves alone.
 RigidPlace ToolTouch::place_of(const Side &side) const {
   const Moved &m = sides_[side.tool];
-  if (responds(side))
-    return {m.set->first_group + m.set->group[side.part], m.set->place[side.part], center(side)};
-  for (const Moved::Jaw &jaw : m.jaws)
-    if (jaw.part == side.part) return {jaw.alone, 0, center(side)};
-  return {kNone, 0, center(side)};
+  const uint32_t g = m.set && m.yields() ? m.set->group[side.part] : DFM_RIGID_STILL;
+  if (g == DFM_RIGID_STILL || m.first[g] == kNone) return {kNone, 0, center(side)};
+  return {m.set->first_group + g, m.set->place[side.part], center(side)};
 }
 
 void ToolTouch::begin_passes() {
@@ -46,11 +35,9 @@ void ToolTouch::begin_passes() {
   changed_ = HUGE_VAL;
 }
 
-std::span<const RigidSides> ToolTouch::sides(const StepContext &step) {
+std::span<const RigidSides> ToolTouch::sides() {
   begin_passes();
   places_.clear();
-  group_size_.assign(step.rigid_groups.begin(), step.rigid_groups.end());
-  group_size_.insert(group_size_.end(), alone_.size(), 1);
   for (const Row &row : rows_)
     places_.push_back(
         {place_of(row.a), place_of(row.b), center(row.a) + row.a.arm, row.normal, row.tangent[0]});
@@ -70,32 +57,24 @@ bool ToolTouch::fill_response(uint32_t group, double *matrix) const {
   for (const Moved &m : sides_) {
     if (!m.set) continue;
     const uint32_t g = group - m.set->first_group;
-    const bool own = group >= m.set->first_group && g < m.set->ngroup;
-    if (own && m.first[g] == kNone) return false;
-    const size_t wide = own ? m.wide[g] : 6;
-    if (own) std::copy_n(&m.response[m.first[g]], wide * wide, matrix);
-    for (const Moved::Jaw &jaw : m.jaws) {
-      if (own && jaw.alone == kNone && m.set->group[jaw.part] == g)
-        add_jaw(jaw, matrix + 6 * size_t{m.set->place[jaw.part]} * (wide + 1), wide);
-      if (jaw.alone != group) continue;
-      std::fill_n(matrix, 36, 0.0);
-      add_jaw(jaw, matrix, 6);
-      return true;
-    }
-    if (own) return true;
+    if (group < m.set->first_group || g >= m.set->ngroup) continue;
+    if (m.first[g] == kNone) return false;
+    const size_t wide = m.wide[g];
+    std::copy_n(&m.response[m.first[g]], wide * wide, matrix);
+    for (const Moved::Jaw &jaw : m.jaws)
+      add_jaw(jaw, matrix + 6 * size_t{m.set->place[jaw.part]} * (wide + 1), wide);
+    return true;
   }
   return false;
 }
 
 std::span<const RigidMember> ToolTouch::members(const StepContext &step, uint32_t group) const {
-  const size_t groups = step.rigid_groups.size();
-  if (group >= groups) return {&alone_[group - groups], 1};
   return {step.rigid_members.data() + step.rigid_first[group], step.rigid_groups[group]};
 }
 
-bool ToolTouch::free_velocity(const RigidSet &set, uint32_t body, bool alone, double *out) const {
+bool ToolTouch::free_velocity(const RigidSet &set, uint32_t body, double *out) const {
   const Moved *const m = known(set);
-  if (!m || !(m->responds || alone)) return false;
+  if (!m || !m->yields()) return false;
   for (size_t k = 0; k < 6; ++k) out[k] = m->free[6 * size_t{body} + k] + m->turn[6 * size_t{body} + k];
   return true;
 }

@@ -71,8 +71,7 @@ void ToolTouch::add_rows_to_velocities(const StepContext &step) {
   add_impulses();
   for (Moved &m : sides_) {
     for (const Moved::Jaw &jaw : m.jaws) {
-      const double *const p = &m.set->impulse[6 * size_t{jaw.part}];
-      const double rate = jaw.softness * (dot(jaw.lever, load3(p)) + dot(jaw.axis, load3(p + 3)));
+      const double rate = rate_of(m, jaw);
       add3(&m.now[6 * size_t{jaw.part}], rate * jaw.lever);
       add3(&m.now[6 * size_t{jaw.part} + 3], rate * jaw.axis);
     }

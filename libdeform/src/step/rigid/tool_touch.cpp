@@ -107,13 +107,12 @@ void ToolTouch::prepare(World &w, SceneFacts &facts) {
   rows_.clear();  // of bodies that may be gone
   sides_.clear();
   sets_.clear();
-  alone_.clear();
   walls_.clear();
   w.pairs.tool_law.clear();
   if (w.rigid_sets.empty()) return;
   offset_ = w.offset;
   for (const auto &t : w.tools)
-    if (t->motion.coupled() && t->has_jaws()) sets_.push_back(t->set);
+    if (t->has_jaws()) sets_.push_back(t->set);
   side_of_.assign(w.obstacles.size(), {kNone, 0, {}, {}});
   const auto take_part = [&](uint32_t slot) {
     const Obstacle &o = *w.obstacles[slot];
@@ -446,7 +445,6 @@ bool ToolTouch::follow(World &w, StepContext &step) {
 // Takes velocities and responses of the sets that take part, and the motion of everything else.
 void ToolTouch::take_sets(World &w, StepContext &step) {
   sides_.resize(sets_.size() + !walls_.empty());
-  alone_.clear();
   for (size_t k = 0; k < sides_.size(); ++k) {
     Moved &m = sides_[k];
     m.set = k < sets_.size() ? sets_[k] : nullptr;
@@ -486,8 +484,8 @@ void ToolTouch::take_sets(World &w, StepContext &step) {
     }
     m.responds = later || std::any_of(m.response.begin(), m.response.end(), [](double x) { return x != 0; });
     for (const auto &t : w.tools)
-      if (t->set == m.set && t->has_jaws()) list_jaws(m, static_cast<uint32_t>(step.rigid_groups.size()));
-    if (m.responds) straighten(m);
+      if (t->set == m.set && t->has_jaws()) list_jaws(m);
+    straighten(m);
     m.now = m.free;
   }
 }
@@ -544,8 +542,6 @@ bool ToolTouch::begin(World &w, StepContext &step) {
   });
   if (rows_.empty()) return true;
   if (!follows_arcs(w, step)) return false;
-  for (Moved &m : sides_)
-    if (!m.responds) straighten(m);  // jaws that move alone turn by what is rigid only
   take_last(w, step);
   for (const Moved &m : sides_)
     if (m.set) m.set->velocity.assign(m.now.begin(), m.now.end());
@@ -556,7 +552,7 @@ void ToolTouch::correct() {
   for (Moved &m : sides_) {
     if (!m.set) continue;
     m.free.assign(m.set->velocity.begin(), m.set->velocity.end());
-    if (m.responds || !rows_.empty()) straighten(m);
+    straighten(m);
     if (m.drives) request_again(m);
   }
 }

@@ -14,12 +14,11 @@
 //            them upright
 //   friction the law of the pair, implicitly, at the slip and normal force of the solution (tool_rub.cpp);
 //            impulses and the state of the law last from sub-step to sub-step (World::tool_store)
-//   jaws     follow their angle exactly, so the force on what two of them hold would have no bound. Something
-//            rigid turns a jaw about its hinge by moment over stiffness, at the end of the sub-step (a spring
-//            without mass, backward Euler); soft bodies do so where the tool is coupled. The face of a jaw
-//            yields as well, by a hundredth of a millimeter per newton; otherwise it would be undefined how
-//            rigid things share a load. Jaws of a tool without a coupling pass through obstacles, as the tool
-//            does
+//   jaws     follow their angle exactly, so the force on what two of them hold would have no bound. What a
+//            jaw touches turns it about its hinge by moment over stiffness, at the end of the sub-step (a
+//            spring without mass, backward Euler). Its face yields as well, by a hundredth of a millimeter
+//            per newton; otherwise it would be undefined how rigid things share a load. Jaws of a tool
+//            without a coupling pass through obstacles, as the tool does
 //   joints   bodies that joints connect are one group, whose response contains the joints (tool_joints.cpp)
 //   order    The rows are part of the one contact problem of a sub-step (step/solve/solve.cpp). What turning
 //            adds and motors depend on its solution: follow() updates them, and the solve goes on
@@ -61,17 +60,14 @@ class ToolTouch {
   // Called before detection: finds the rows of this sub-step, and adds to the sets' velocities what their
   // impulses of the last one do. Returns false if the sub-step must be repeated, shorter (StepLength).
   bool begin(World &w, StepContext &step);
-  // The rows as part of a contact problem: sides of each row, sizes of the groups of bodies that answer each
-  // other, by world-wide number. Jaws that move alone have numbers behind those of the hosts' groups.
-  std::span<const RigidSides> sides(const StepContext &step);
-  std::span<const uint32_t> group_sizes() const { return group_size_; }
+  // The rows as part of a contact problem: sides of each row.
+  std::span<const RigidSides> sides();
   // [6 bodies,6 bodies] 1/kg, of a world-wide group; false: it is unknown here
   bool fill_response(uint32_t group, double *matrix) const;
   // The bodies of a group, by their places in it.
   std::span<const RigidMember> members(const StepContext &step, uint32_t group) const;
-  // m/s, rad/s [6] of a body without contact, with what turning adds. alone: of a jaw that moves alone.
-  // False: it follows its poses, with what rigid things do to its jaws, or nothing of its set is known here.
-  bool free_velocity(const RigidSet &set, uint32_t body, bool alone, double *out) const;
+  // m/s, rad/s [6] of a body without contact, with what turning adds. False: nothing here moves its set.
+  bool free_velocity(const RigidSet &set, uint32_t body, double *out) const;
   void put(ContactRows &to, ContactState &state);
   // Called after the hosts have predicted their velocities again.
   void correct();
@@ -162,9 +158,9 @@ class ToolTouch {
       uint32_t part;
       Vec3 axis, lever;  // velocity of its center by a turn of one about the axis
       double softness;   // rad/s by a moment's impulse of 1 N m s
-      uint32_t alone;    // world-wide number of its group where it moves alone, else kNone
     };
     std::vector<Jaw> jaws;
+    bool yields() const { return responds || !jaws.empty(); }
     // Whether contact with `to` changes the motion of this side. The jaws of a tool without a coupling yield
     // to tools and bodies, but not to obstacles: its poses may lead it along a table.
     bool gives(const Obstacle &to) const;
@@ -188,9 +184,9 @@ class ToolTouch {
   static uint64_t key_of(const std::array<uint64_t, 2> &pair, Name name);
   double fastest(const Side &side, Vec3 around, double reach) const;
   Vec3 center(const Side &side) const;
-  void list_jaws(Moved &m, uint32_t groups);
+  static double rate_of(const Moved &m, const Moved::Jaw &jaw);
   void straighten(Moved &m) const;
-  double moment_of(size_t tool, const Moved::Jaw &jaw) const;
+  void list_jaws(Moved &m);
   Vec3 bend(const Side &side, const Side &other) const;
   Vec3 bend(Vec3 spin, Vec3 arm) const;
   Vec3 bend_slope(Vec3 spin, Vec3 arm, Vec3 by) const;
@@ -202,7 +198,6 @@ class ToolTouch {
   Moved *known(const RigidSet &set) { return const_cast<Moved *>(std::as_const(*this).known(set)); }
   const double *first_of(const Side &side) const;
   // tool_rows.cpp
-  bool responds(const Side &side) const;
   static void add_jaw(const Moved::Jaw &jaw, double *matrix, size_t wide);
   RigidPlace place_of(const Side &side) const;
   void fill_row(Row &row, ContactRows &to, uint32_t r) const;
@@ -264,9 +259,7 @@ class ToolTouch {
   std::vector<Moved> sides_;      // of this sub-step; kept for their memory, as shapes_ are
   ToolShape shapes_[2];
   std::vector<Row> rows_;
-  std::vector<RigidMember> alone_;  // jaws that move alone, by group behind those of the hosts
   std::vector<RigidSides> places_;
-  std::vector<uint32_t> group_size_;   // bodies by world-wide group; behind them one for each jaw alone
   uint32_t passes_ = 0;                // since motors were decided
   double changed_ = 0;                 // m/s, by the pass before
   DisjointSets islands_;               // of groups that rows connect

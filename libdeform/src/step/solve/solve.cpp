@@ -57,7 +57,7 @@ bool fill_responses(World &w, StepContext &step, uint32_t *trouble) {
 constexpr double kWhole = 2.5;
 constexpr uint32_t kMaxRevisions = 12;  // of the responses of rigid hosts, within a sub-step
 // m/s, at which a depth opens that a pair was found with.
-constexpr double kRecoverySpeed = 8e-4;
+constexpr double kRecoverySpeed = 7e-4;
 
 // m, what was left of the depth that the pair was found with; `most` if it is found now.
 double left_of_pair(const ContactStore &store, uint64_t a, uint64_t b, double most) {
@@ -115,7 +115,7 @@ bool make_rows(World &w, StepContext &step, uint32_t *trouble) {
     step.impulse_before_rebuild.assign(step.rows.impulse.begin(), step.rows.impulse.end());
   make_bonds(w, step, again);
   make_cut_drags(w, step, again);
-  const std::span<const RigidSides> between_rigids = step.tools->sides(step);
+  const std::span<const RigidSides> between_rigids = step.tools->sides();
   uint32_t nstate = 0;
   for (const LawInstance *law : w.pairs.laws) nstate = std::max(nstate, law->nstate);
   step.state.resize(n + static_cast<uint32_t>(between_rigids.size()), nstate);
@@ -138,7 +138,7 @@ bool make_rows(World &w, StepContext &step, uint32_t *trouble) {
     const bool set_back = b.surface.identity() && (b.surface.slit || b.surface.back > 0);
     step.sources[i].place = set_back ? b.p.x.data() : nullptr;
   }
-  step.rows.build(step.contacts, step.sources, {step.rigid_places, step.tools->group_sizes()}, step.bonds,
+  step.rows.build(step.contacts, step.sources, {step.rigid_places, step.rigid_groups}, step.bonds,
                   between_rigids);
   start_rigids(w, step);
   if (!fill_responses(w, step, trouble)) return false;

@@ -62,9 +62,9 @@ bool evaluate_laws(const World &w, StepContext &step, SolveIsland &own) {
   spend(w, step, own.spent, 4 * uint64_t{own.part.all()});
   const double *const response = step.rows.wt.data();
   set_trial(step.rows, own.part, step.h, response, step.state);
-  // The sweeps are the next Newton step: from a slip with an error of 1e-2 they reach one of 1e-4.
-  if ((own.bad =
-           own.batches.evaluate_local(step.h, response, 0.1 * tangent_at_rest(w, step.h), 1e-2, step.state)))
+  // The sweeps are the next Newton step: from a slip with this relative error they reach its square.
+  if ((own.bad = own.batches.evaluate_local(step.h, response, 0.1 * tangent_at_rest(w, step.h), Set::of_start,
+                                            step.state)))
     return false;
   if (own.batches.has_smooth()) linearize(step.rows, own.part, step.h, step.state);
   ++own.passes;
