@@ -225,8 +225,8 @@ TEST_P(GpuWorldState, CutWhileItMoves_ContinuesWithTheCellsThatAreLeft) {
   EXPECT_NEAR(height[0], height[2], 1e-5);
 }
 
-// Jaws close on the cube beside its middle and lift it: the force and torque that the tool feels and what each
-// jaw presses with.
+// Jaws close on the cube beside its middle and lift it: the force and torque that the tool feels and what
+// each jaw presses with.
 TEST_P(GpuWorld, LiftedByAGrasper_PullsAsOnTheProcessor) {
   std::vector<double> felt[2];
   for (const bool card : {false, true}) {
