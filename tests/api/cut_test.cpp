@@ -571,51 +571,6 @@ TEST(Cut, RandomCuts_KeepTheBooksToTheEnd) {
   }
 }
 
-namespace {
-
-// A bar whose ends are held, the right one pulled away at 0.3 m/s.
-struct PulledBar {
-  test::Context context;
-  dfm_world w;
-  dfm_body b = 0;
-  explicit PulledBar(const char *model, double tear) : w(test::make_world(context, {0, 0, 0})) {
-    dfm_mesh_handle mesh = 0;
-    const double size[] = {0.3, 0.06, 0.06};
-    test::ok(dfm_mesh_make(context, "beam", size, DFM_MESH_CELLS, 200, &mesh));
-    dfm_body_def d = dfm_body_def_default();
-    test::lend(mesh, d);
-    dfm_material_def m = dfm_material_def_default();
-    m.name = "dough";
-    m.young = 2e4;
-    m.damping_stiffness = 2e-3;
-    m.damping_mass = 2;
-    const dfm_param_value row{"tear", &tear, 1};
-    m.extra = {sizeof(dfm_params), tear != 0 ? 1u : 0u, &row};
-    if (dfm_material_create(w, &m, &d.material) != DFM_OK) return;
-    d.name = "bar";
-    d.model = model;
-    if (dfm_body_create(w, &d, &b) != DFM_OK) return;
-    std::vector<uint32_t> ends[2];
-    for (uint32_t i = 0; i < d.npoint; ++i)
-      for (int side = 0; side < 2; ++side)
-        if (std::fabs(d.points[3 * size_t{i}] - 0.3 * side) < 1e-6) ends[side].push_back(i);
-    for (const auto &end : ends) test::ok(dfm_body_hold(b, uint32_t(end.size()), end.data(), 7));
-    dfm_pose_key keys[2] = {};
-    for (dfm_pose_key &key : keys) key.pose.rotation[3] = 1;
-    keys[1].t = 1;
-    keys[1].pose.position[0] = 0.3;
-    test::ok(dfm_body_move_held(b, uint32_t(ends[1].size()), ends[1].data(), 2, keys, nullptr));
-  }
-  uint32_t tears() const {
-    uint32_t points = 0;
-    for (const dfm_contact_event &e : test::listed(dfm_world_events, w))
-      if (e.kind == uint32_t{DFM_EVENT_TEAR} && e.a == b && e.b == b) points += uint32_t(e.key);
-    return points;
-  }
-};
-
-}  // namespace
-
 TEST(Tear, PulledBar_PartsAtTheStrainOfItsMaterial) {
   for (const char *model : kModels) {
     PulledBar s(model, 0.3), tough(model, 0);

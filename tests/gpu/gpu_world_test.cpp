@@ -4,6 +4,7 @@
 
 #include "cut_scenes.h"
 #include "support.h"
+#include "tool.h"
 #include "under_ball.h"
 #include "world.h"
 
@@ -222,6 +223,62 @@ TEST_P(GpuWorldState, CutWhileItMoves_ContinuesWithTheCellsThatAreLeft) {
   }
   EXPECT_EQ(hash[0], hash[1]);
   EXPECT_NEAR(height[0], height[2], 1e-5);
+}
+
+// Jaws close on the cube beside its middle and lift it: the force and torque that the tool feels and what
+// each jaw presses with.
+TEST_P(GpuWorld, LiftedByAGrasper_PullsAsOnTheProcessor) {
+  std::vector<double> felt[2];
+  for (const bool card : {false, true}) {
+    World w(card ? GetParam() : on_the_processor(GetParam()), device(), "coulomb", 0.8, {0, 0, -9.81}, 1e-4,
+            1e5);
+    dfm_tool_def d = dfm_tool_def_default();
+    d.shape = DFM_TOOL_GRASPER;
+    d.half_size[0] = 0.01;
+    d.half_size[1] = 0.03;
+    d.half_size[2] = 0.25;
+    d.radius = 0;
+    d.opening = 0.27;
+    d.pose = test::tools::pose({0.05, 0.04, 0.51});
+    const dfm_tool jaws = test::tools::make(w.world, d);
+    for (int n = 1; n <= 600; ++n) {
+      const double t = 2e-3 * n;
+      test::ok(dfm_tool_set_opening(jaws, std::max(0.27 - 0.5 * t, 0.2)));
+      d.pose.position[2] = 0.51 + 0.2 * std::clamp(t - 0.2, 0.0, 0.2);
+      test::ok(dfm_tool_set_pose(jaws, &d.pose, nullptr));
+      ASSERT_EQ(dfm_world_step(w.world, 2e-3, nullptr), DFM_OK) << dfm_last_error();
+    }
+    felt[card].resize(6);
+    test::ok(dfm_tool_force(jaws, &felt[card][0], &felt[card][3]));
+    for (const dfm_pair_report &pair : test::listed(dfm_world_pairs, w.world))
+      felt[card].push_back(pair.normal);
+    EXPECT_NEAR(felt[card][2], -9.81, 0.1);
+    EXPECT_NEAR(w.now().com[2], 0.09, 0.005);
+  }
+  ASSERT_EQ(felt[0].size(), 8u);
+  ASSERT_EQ(felt[1].size(), 8u);
+  for (size_t k = 0; k < 8; ++k) {
+    const double *const of = &felt[0][k / 3 * 3];
+    const double whole = k < 6 ? std::hypot(of[0], of[1], of[2]) : felt[0][k];
+    EXPECT_NEAR(felt[1][k], felt[0][k], 0.01 * whole) << k;
+  }
+}
+
+TEST(GpuTear, PulledBar_PartsAsOnTheProcessor) {
+  for (const std::string model : test::cutting::kModels) {
+    using Bar = test::cutting::PulledBar;
+    Bar processor(model.c_str(), 0.3), card((model + "_gpu").c_str(), 0.3, device());
+    const dfm_body_measure before = test::measure(card.b);
+    for (const Bar *bar : {&processor, &card}) test::run(bar->w, 0.5, 1e-3);
+    const dfm_body_measure after = test::measure(card.b);
+    const uint32_t torn = processor.tears();
+    EXPECT_GT(torn, 4u) << model;
+    EXPECT_EQ(card.tears(), torn) << model;
+    EXPECT_GT(test::cutting::parts(card.b), 1u) << model;
+    EXPECT_EQ(test::cutting::parts(card.b), test::cutting::parts(processor.b)) << model;
+    EXPECT_NEAR(after.mass, before.mass, 1e-13);
+    EXPECT_NEAR(after.elastic, test::measure(processor.b).elastic, 0.02 * after.elastic) << model;
+  }
 }
 
 // rho g L/E = 0.75: springs alone do not tell a cell from its mirror image.

@@ -180,4 +180,51 @@ struct CubeOnFloor {
 
 inline const char *const kModels[] = {"msm", "corotational_fem"};
 
+// A bar whose ends are held, the right one pulled away at 0.3 m/s.
+struct PulledBar {
+  test::Context context;
+  dfm_world w;
+  dfm_body b = 0;
+  explicit PulledBar(const char *model, double tear, double device = 0)
+      : w(test::make_world(context, {0, 0, 0})) {
+    dfm_mesh_handle mesh = 0;
+    const double size[] = {0.3, 0.06, 0.06};
+    test::ok(dfm_mesh_make(context, "beam", size, DFM_MESH_CELLS, 200, &mesh));
+    dfm_body_def d = dfm_body_def_default();
+    test::lend(mesh, d);
+    dfm_material_def m = dfm_material_def_default();
+    m.name = "dough";
+    m.young = 2e4;
+    m.damping_stiffness = 2e-3;
+    m.damping_mass = 2;
+    const dfm_param_value row{"tear", &tear, 1};
+    m.extra = {sizeof(dfm_params), tear != 0 ? 1u : 0u, &row};
+    if (dfm_material_create(w, &m, &d.material) != DFM_OK) return;
+    d.name = "bar";
+    d.model = model;
+    const dfm_param_value on{"device", &device, 1};
+    if (device > 0) d.model_params = {sizeof(dfm_params), 1, &on};
+    std::vector<uint32_t> ends[2];
+    for (uint32_t i = 0; i < d.npoint; ++i)
+      for (int side = 0; side < 2; ++side)
+        if (std::fabs(d.points[3 * size_t{i}] - 0.3 * side) < 1e-6) ends[side].push_back(i);
+    std::vector<uint8_t> fixed(d.npoint, 0);
+    for (const auto &end : ends)
+      for (const uint32_t i : end) fixed[i] = 7;
+    d.fixed = fixed.data();
+    if (dfm_body_create(w, &d, &b) != DFM_OK) return;
+    dfm_pose_key keys[2] = {};
+    for (dfm_pose_key &key : keys) key.pose.rotation[3] = 1;
+    keys[1].t = 1;
+    keys[1].pose.position[0] = 0.3;
+    test::ok(dfm_body_move_held(b, uint32_t(ends[1].size()), ends[1].data(), 2, keys, nullptr));
+  }
+  uint32_t tears() const {
+    uint32_t points = 0;
+    for (const dfm_contact_event &e : test::listed(dfm_world_events, w))
+      if (e.kind == uint32_t{DFM_EVENT_TEAR} && e.a == b && e.b == b) points += uint32_t(e.key);
+    return points;
+  }
+};
+
 }  // namespace test::cutting

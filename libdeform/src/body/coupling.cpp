@@ -1,9 +1,10 @@
-// A surfel moves with the cell that contains it: its weights are its barycentric coordinates at rest in a
-// tetrahedron, the shape functions at its place in a hexahedron. They reproduce linear fields, also outside
-// the cell, where they extrapolate: the nearest tetrahedron, or all hexahedra within the length of a cell, so
-// that the surface has no steps where the nearest one changes. Their parts are ((2 - d) / d)^2, d being the
-// distance from the cell in its own coordinates, along which it is two long (R. Franke, G. Nielson, Smooth
-// interpolation of large sets of scattered data, Int. J. Numer. Meth. Engng 15, 1980).
+// A surfel moves with the cell that contains it: its weights are the shape functions at its place at rest,
+// in a first-order tetrahedron its barycentric coordinates. They reproduce linear fields, in affine cells of
+// second order quadratic ones, also outside, where they extrapolate: the nearest tetrahedron, or all other
+// cells within the length of one, so that the surface has no steps where the nearest one changes. Their
+// parts are ((2 - d) / d)^2, d being the distance from the cell in its own coordinates, along which it is
+// two long (R. Franke, G. Nielson, Smooth interpolation of large sets of scattered data, Int. J. Numer.
+// Meth. Engng 15, 1980).
 #include "body/coupling.h"
 
 #include <algorithm>
@@ -78,18 +79,35 @@ void tet_weights(Vec3 x, const Vec3 c[4], double w[4]) {
   w[3] = g;
 }
 
-// Place of x in the coordinates of the hexahedron c and its shape functions there, by Newton's method from
-// its center: one step in a box. False where it does not get there, far outside a distorted cell.
-bool hexahedron_weights(Vec3 x, const Vec3 c[8], Vec3 &at, double w[8]) {
+// m2, of its diagonal or of the longest edge at its first corner.
+double length2(uint32_t nodes, const Vec3 *c) {
+  if (nodes != 10) return norm2(c[6] - c[0]);
+  return std::max({norm2(c[1] - c[0]), norm2(c[2] - c[0]), norm2(c[3] - c[0])});
+}
+
+// Distance of a place from the cell, in halves of the cell's length.
+double beyond(uint32_t nodes, Vec3 at) {
+  const auto above = [](double a) { return std::max(a, 0.0); };
+  if (nodes == 10) {
+    const double last = above(at.x + at.y + at.z - 1);
+    return 2 * std::sqrt(norm2(Vec3{above(-at.x), above(-at.y), above(-at.z)}) + last * last);
+  }
+  return norm(Vec3{above(std::fabs(at.x) - 1), above(std::fabs(at.y) - 1), above(std::fabs(at.z) - 1)});
+}
+
+// Place of x in the coordinates of the cell c and its shape functions there, by Newton's method from its
+// center: one step where its edges are straight and parallel. False where it does not get there, far outside
+// a distorted cell.
+bool cell_weights(uint32_t nodes, Vec3 x, const Vec3 *c, Vec3 &at, double *w) {
   constexpr int kSteps = 20;
-  const double near2 = 1e-28 * norm2(c[6] - c[0]);
-  at = {};
+  const double near2 = 1e-28 * length2(nodes, c);
+  at = nodes == 10 ? Vec3{0.25, 0.25, 0.25} : Vec3{};
   for (int step = 0; step < kSteps; ++step) {
-    Vec3 left = x, along[3], slope[8];
-    hexahedron_shapes(8, at, w, slope);
-    for (int k = 0; k < 8; ++k) left -= w[k] * c[k];
+    Vec3 left = x, along[3], slope[kMaxNodes];
+    cell_shapes(nodes, at, w, slope);
+    for (uint32_t k = 0; k < nodes; ++k) left -= w[k] * c[k];
     if (norm2(left) <= near2) return true;
-    for (int k = 0; k < 8; ++k) {
+    for (uint32_t k = 0; k < nodes; ++k) {
       along[0] += slope[k].x * c[k];
       along[1] += slope[k].y * c[k];
       along[2] += slope[k].z * c[k];
@@ -122,8 +140,8 @@ class RestCells {
   double row(Vec3 x, Array<RowEntry> &out) const;
 
  private:
-  // The same from hexahedra; false where the nearest one does not reach.
-  bool hexahedra(Vec3 x, uint32_t nearest, double away, Array<RowEntry> &out) const;
+  // The same from cells that are no first-order tetrahedra; false where the nearest one does not reach.
+  bool cells(Vec3 x, uint32_t nearest, double away, Array<RowEntry> &out) const;
 
   const CouplingInput &in_;
   const LocalRest &rest_;
@@ -159,39 +177,38 @@ uint32_t RestCells::find(Vec3 x, double &away) const {
   return cell;
 }
 
-bool RestCells::hexahedra(Vec3 x, uint32_t nearest, double away, Array<RowEntry> &out) const {
-  const uint32_t tets = cell_kind(DFM_CELL_HEX8).tets;
-  Vec3 of[8], at;
-  double w[8], all = 0;
-  const auto corners = [&](uint32_t hexahedron) {
-    for (size_t k = 0; k < 8; ++k) of[k] = rest_.point[in_.hexahedron[8 * size_t{hexahedron} + k]];
+bool RestCells::cells(Vec3 x, uint32_t nearest, double away, Array<RowEntry> &out) const {
+  const CellKind &kind = cell_kind(in_.kind);
+  Vec3 of[kMaxNodes], at;
+  double w[kMaxNodes], all = 0;
+  // Whether x has a place in it.
+  const auto reaches = [&](uint32_t cell) {
+    for (size_t k = 0; k < kind.nodes; ++k) of[k] = rest_.point[in_.cells[kind.nodes * size_t{cell} + k]];
+    return cell_weights(kind.nodes, x, of, at, w);
   };
-  const auto add = [&](uint32_t hexahedron, double part) {
-    for (size_t k = 0; k < 8; ++k) out.push_back({in_.hexahedron[8 * size_t{hexahedron} + k], part * w[k]});
+  const auto add = [&](uint32_t cell, double part) {
+    for (size_t k = 0; k < kind.nodes; ++k)
+      out.push_back({in_.cells[kind.nodes * size_t{cell} + k], part * w[k]});
     all += part;
   };
-  corners(nearest / tets);
-  if (!hexahedron_weights(x, of, at, w)) return false;
+  if (!reaches(nearest / kind.tets)) return false;
   if (away == 0) {
-    add(nearest / tets, 1);
+    add(nearest / kind.tets, 1);
     return true;
   }
-  const double far2 = norm2(of[6] - of[0]);
+  const double far2 = length2(kind.nodes, of);
   std::vector<uint32_t> found;
-  tree_.near(x, far2, [&](uint32_t t) { found.push_back(t / tets); });
+  tree_.near(x, far2, [&](uint32_t t) { found.push_back(t / kind.tets); });
   std::ranges::sort(found);
   found.erase(std::unique(found.begin(), found.end()), found.end());
-  for (const uint32_t hexahedron : found) {
-    corners(hexahedron);
-    if (!hexahedron_weights(x, of, at, w)) continue;
-    const auto beyond = [](double xi) { return std::max(std::fabs(xi) - 1, 0.0); };
-    const double d = norm(Vec3{beyond(at.x), beyond(at.y), beyond(at.z)});
-    if (d < 2) add(hexahedron, (2 - d) * (2 - d) / std::max(d * d, kInside * kInside));
+  for (const uint32_t cell : found) {
+    if (!reaches(cell)) continue;
+    const double d = beyond(kind.nodes, at);
+    if (d < 2) add(cell, (2 - d) * (2 - d) / std::max(d * d, kInside * kInside));
   }
   if (!(all > 0)) {
-    corners(nearest / tets);
-    hexahedron_weights(x, of, at, w);
-    add(nearest / tets, 1);
+    reaches(nearest / kind.tets);
+    add(nearest / kind.tets, 1);
   }
   for (RowEntry &e : out) e.weight /= all;
   add_up(out);
@@ -201,7 +218,7 @@ bool RestCells::hexahedra(Vec3 x, uint32_t nearest, double away, Array<RowEntry>
 double RestCells::row(Vec3 x, Array<RowEntry> &out) const {
   double away;
   const uint32_t cell = find(x, away);
-  if (in_.hexahedron && hexahedra(x, cell, away, out)) return away;
+  if (in_.cells && cells(x, cell, away, out)) return away;
   const uint32_t *const corner = in_.tet + size_t{4} * cell;
   Vec3 c[4];
   double w[4];

@@ -19,11 +19,12 @@ struct Coupling {
 // Input of couplings, all at rest, m.
 struct CouplingInput {
   uint32_t npoint = 0, ntet = 0, nsurfel = 0;
-  const double *point = nullptr;         // [npoint,3]
-  const uint32_t *tet = nullptr;         // [ntet,4]
-  const double *surfel = nullptr;        // [nsurfel,3]
-  const uint32_t *hexahedron = nullptr;  // [ntet/6,8] where the tetrahedra are those of hexahedra
-  double support = 3;                    // mean distances to the ten nearest phyxels
+  const double *point = nullptr;    // [npoint,3]
+  const uint32_t *tet = nullptr;    // [ntet,4]
+  const double *surfel = nullptr;   // [nsurfel,3]
+  const uint32_t *cells = nullptr;  // their nodes, where the tetrahedra are those of other cells
+  uint32_t kind = 0;                // DFM_CELL_* of these
+  double support = 3;               // mean distances to the ten nearest phyxels
 };
 
 // [nsurfel] the lowest cell that contains each surfel, else the nearest one.

@@ -31,6 +31,7 @@ constexpr Quads kMiddles = {{11, 10, 9, 8},  {12, 13, 14, 15}, {8, 17, 12, 16},
                             {9, 18, 13, 17}, {10, 19, 14, 18}, {11, 16, 15, 19}};
 constexpr uint8_t kAtCorner[8][3] = {{8, 11, 16},  {8, 17, 9},   {10, 9, 18},  {10, 19, 11},
                                      {12, 16, 15}, {12, 13, 17}, {14, 18, 13}, {14, 15, 19}};
+constexpr uint8_t kTetEdges[6][2] = {{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}};
 constexpr uint8_t kHexEdges[12][2] = {{0, 1}, {1, 2}, {2, 3}, {3, 0}, {4, 5}, {5, 6},
                                       {6, 7}, {7, 4}, {0, 4}, {1, 5}, {2, 6}, {3, 7}};
 // Coordinates of the nodes of a hexahedron, and the node at each place, the first coordinate fastest.
@@ -63,7 +64,7 @@ Vec3 place_of(uint32_t node) {
 double jacobian(uint32_t nodes, const double *points, size_t stride, const uint32_t *cell, Vec3 at) {
   double value[kMaxNodes];
   Vec3 slope[kMaxNodes], along[3];
-  hexahedron_shapes(nodes, at, value, slope);
+  cell_shapes(nodes, at, value, slope);
   for (uint32_t k = 0; k < nodes; ++k) {
     const Vec3 x = load3(points + stride * cell[k]);
     along[0] += slope[k].x * x;
@@ -146,7 +147,7 @@ void mass_shares(const CellKind &kind, const double *points, const uint32_t *cel
     Vec3 slope[kMaxNodes];
     if (kind.nodes == 20) weight *= kShare[q % 3] * kShare[q / 3 % 3] * kShare[q / 9];
     for (int axis = 0; kind.nodes == 27 && axis < 3; ++axis) weight *= kPlace[q][axis] ? 1 : 4;
-    hexahedron_shapes(kind.nodes, place, shape, slope);
+    cell_shapes(kind.nodes, place, shape, slope);
     for (uint32_t k = 0; k < kind.nodes; ++k) {
       const double share = weight * (kind.nodes == 20 ? shape[k] * shape[k] : shape[k]);
       out[k] += share;
@@ -162,7 +163,21 @@ Vec3 inside_place(uint32_t point) {
   return {kAt[point % 3], kAt[point / 3 % 3], kAt[point / 9]};
 }
 
-void hexahedron_shapes(uint32_t nodes, Vec3 at, double *value, Vec3 *slope) {
+void cell_shapes(uint32_t nodes, Vec3 at, double *value, Vec3 *slope) {
+  if (nodes == 10) {
+    constexpr Vec3 kSlope[4] = {{-1, -1, -1}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+    const double part[4] = {1 - at.x - at.y - at.z, at.x, at.y, at.z};
+    for (int k = 0; k < 4; ++k) {
+      value[k] = part[k] * (2 * part[k] - 1);
+      slope[k] = (4 * part[k] - 1) * kSlope[k];
+    }
+    for (int e = 0; e < 6; ++e) {
+      const uint32_t a = kTetEdges[e][0], b = kTetEdges[e][1];
+      value[4 + e] = 4 * part[a] * part[b];
+      slope[4 + e] = 4 * part[a] * kSlope[b] + 4 * part[b] * kSlope[a];
+    }
+    return;
+  }
   const double x[3] = {at.x, at.y, at.z};
   for (uint32_t k = 0; k < nodes; ++k) {
     double f[3], d[3], along = -2;
@@ -199,7 +214,7 @@ void each_inside(const double *points, size_t stride, const uint32_t *cell, cons
     const Vec3 at = inside_place(q);
     double shape[8];
     Vec3 place, slope[8];
-    hexahedron_shapes(8, at, shape, slope);
+    cell_shapes(8, at, shape, slope);
     for (uint32_t k = 0; k < 8; ++k) place += shape[k] * load3(points + stride * cell[k]);
     use(8 * inside[q] * jacobian(8, points, stride, cell, at), place);
   }
@@ -268,8 +283,7 @@ RestMesh second_order(const RestMesh &mesh) {
     out.cells.insert(out.cells.end(), q, q + corners);
     out.tet_group.insert(out.tet_group.end(), kind.tets, mesh.tet_group[t]);
     if (!hexahedra) {
-      for (const auto &[a, b] : {std::pair{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}})
-        out.cells.push_back(middle(q[a], q[b]));
+      for (const auto &[a, b] : kTetEdges) out.cells.push_back(middle(q[a], q[b]));
       continue;
     }
     for (const auto &[a, b] : kHexEdges) out.cells.push_back(middle(q[a], q[b]));

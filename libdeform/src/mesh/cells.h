@@ -45,8 +45,9 @@ void mass_shares(const CellKind &kind, const double *points, const uint32_t *cel
 // coordinates.
 inline constexpr uint32_t kInsidePoints = 27;
 Vec3 inside_place(uint32_t point);
-// Shape functions there of hexahedra of 8, 20 or 27 nodes, and their derivatives by the coordinates.
-void hexahedron_shapes(uint32_t nodes, Vec3 at, double *value, Vec3 *slope);
+// Shape functions of a cell of 8, 10, 20 or 27 nodes at a place in its coordinates, and their derivatives by
+// these: -1 to 1 in a hexahedron; in a tetrahedron 0 to 1 along the edges at its first corner.
+void cell_shapes(uint32_t nodes, Vec3 at, double *value, Vec3 *slope);
 // Whether the material of a cell is turned inside out, in its middle.
 bool inverted_inside(const double *points, size_t stride, const uint32_t *cell, const double *inside);
 // Calls use(volume, place) for each: the sum of volume f(place) is the integral over the material.

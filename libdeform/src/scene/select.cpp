@@ -113,10 +113,10 @@ std::vector<uint8_t> skin_marks(const Selection &where, const BodyMesh &mesh) {
 // f(point, weight) for those that a point of the skin follows, as in the body's coupling.
 template <class F>
 void each_point_of(const BodyMesh &mesh, uint32_t s, F f) {
-  if (mesh.info.cells && mesh.info.cell == DFM_CELL_HEX8) {
+  if (mesh.info.cells) {
     if (!mesh.rows) {
       const CouplingInput in{mesh.info.npoint, mesh.info.ntet,          mesh.skin.npoint, mesh.points.data(),
-                             mesh.info.tets,   mesh.skin.points.data(), mesh.info.cells};
+                             mesh.info.tets,   mesh.skin.points.data(), mesh.info.cells,  mesh.info.cell};
       mesh.rows = std::make_shared<const Coupling>(couple_barycentric(Memory::standard(), in));
     }
     for (uint32_t k = mesh.rows->row[s]; k < mesh.rows->row[s + 1]; ++k)

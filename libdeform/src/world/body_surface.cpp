@@ -52,7 +52,8 @@ void couple(Body &b, const dfm_surface_def &def) {
   in.point = b.p.rest.data();
   in.tet = b.tets.data();
   in.surfel = def.points;
-  if (b.cell_type == DFM_CELL_HEX8) in.hexahedron = b.cells.data();
+  if (!b.cells.empty()) in.cells = b.cells.data();
+  in.kind = b.cell_type;
   if (def.support > 0) in.support = def.support;
   Coupling c = def.coupling == DFM_COUPLING_MLS      ? couple_mls(m, in)
                : def.coupling == DFM_COUPLING_THESIS ? couple_thesis(m, in)

@@ -116,17 +116,22 @@ TEST_P(Cells, Files_GiveBackCellsGroupsAndPoints) {
 }
 
 // Their sum is 1, that of the slopes 0, and each is 1 at its node.
-TEST(HexahedronShapes, SumToOneAndAreOneAtTheirNodes) {
-  for (const uint32_t nodes : {8u, 20u, 27u}) {
-    const RestMesh cell = second_order(make_bricks(kMemory, 2, 2, 2, 1));
+TEST(CellShapes, SumToOneAndAreOneAtTheirNodes) {
+  RestMesh corner(kMemory);
+  corner.points = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
+  corner.tets = {0, 1, 2, 3};
+  corner.tet_group = {kNoGroup};
+  corner.file_point = {0, 1, 2, 3};
+  for (const uint32_t nodes : {8u, 10u, 20u, 27u}) {
+    const RestMesh cell = second_order(nodes == 10 ? corner : make_bricks(kMemory, 2, 2, 2, 1));
     double value[kMaxNodes];
     Vec3 slope[kMaxNodes];
     for (uint32_t n = 0; n < nodes; ++n) {
-      const Vec3 at = load3(&cell.points[3 * size_t{cell.cells[n]}]) - Vec3{1, 1, 1};
-      hexahedron_shapes(nodes, at, value, slope);
+      const Vec3 at = load3(&cell.points[3 * size_t{cell.cells[n]}]) - (nodes == 10 ? Vec3{} : Vec3{1, 1, 1});
+      cell_shapes(nodes, at, value, slope);
       for (uint32_t k = 0; k < nodes; ++k) EXPECT_EQ(value[k], double(k == n)) << nodes;
     }
-    hexahedron_shapes(nodes, {0.3, -0.8, 0.1}, value, slope);
+    cell_shapes(nodes, {0.3, -0.8, 0.1}, value, slope);
     EXPECT_NEAR(std::accumulate(value, value + nodes, 0.0), 1, 1e-15);
     EXPECT_LT(norm(std::accumulate(slope, slope + nodes, Vec3{})), 1e-15);
   }
