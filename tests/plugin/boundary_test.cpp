@@ -42,8 +42,8 @@ TEST(Boundary, EvalThatChangesTheEnvironment_IsPutBackAndNamedOnce) {
   const char *const words[] = {"", "the rounding mode", "how denormal numbers are treated",
                                "which floating-point exceptions raise a signal", "the rounding mode"};
   for (int way = 1; way <= 4; ++way) {
-#if !defined(__x86_64__)
-    if (way == 2) continue;
+#if !defined(__x86_64__)  // others need not raise signals
+    if (way == 3) continue;
 #endif
     Context c;
     ASSERT_EQ(dfm_plugin_load(c.c, tiny::plugin("tiny_rounds").c_str()), DFM_OK);

@@ -5,10 +5,8 @@
 
 #include <clocale>
 #include <stdexcept>
-#if defined(__x86_64__)
-#include <xmmintrin.h>
-#endif
 
+#include "../../support/flush_denormals.h"
 #include "deform/plugin.hpp"
 
 namespace {
@@ -20,12 +18,6 @@ const struct Loaded {
   }
 } loaded;
 const dfm_host *host = nullptr;
-
-void flush_denormals() {
-#if defined(__x86_64__)
-  _mm_setcsr(_mm_getcsr() | 0x8040);
-#endif
-}
 
 dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) {
   host->log(host->ctx, 1, 0, "eval at work");

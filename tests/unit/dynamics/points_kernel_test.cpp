@@ -127,7 +127,8 @@ struct Moving {
 
 TEST(PointsKernels, QueriesOfCellsAndEdges_AreThoseOfOneAtATime) {
   check(dfm::points_kernels_sse2());
-  if (dfm::doubles_at_once() >= 4) check(dfm::points_kernels_avx2());
+  if constexpr (dfm::kHasWider)
+    if (dfm::doubles_at_once() >= 4) check(dfm::points_kernels_avx2());
 }
 
 // Points that cannot bound the step are left out early, which changes no bit.
@@ -166,7 +167,8 @@ TEST(PointsKernels, PartsInAnyOrder_EndWhereAllPointsDo) {
   const Moving m;
   const std::vector<double> all = m.ends(dfm::points_kernels_sse2(), 0, Moving::kPoints);
   std::vector<const dfm::PointsKernels *> widths = {&dfm::points_kernels_sse2()};
-  if (dfm::doubles_at_once() >= 4) widths.push_back(&dfm::points_kernels_avx2());
+  if constexpr (dfm::kHasWider)
+    if (dfm::doubles_at_once() >= 4) widths.push_back(&dfm::points_kernels_avx2());
   for (const dfm::PointsKernels *kernels : widths)
     for (uint32_t parts : {0u, 1u, 2u, 33u, 200u})
       for (uint32_t ahead : {1u, 4u, Moving::kPoints})

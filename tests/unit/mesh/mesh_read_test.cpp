@@ -48,7 +48,6 @@ std::set<std::set<Corner>> cells_in_space(const RestMesh &m) {
 
 TEST(MeshRead, EveryDialect_GivesTheSameBody) {
   auto files = test::own_meshes();
-  ASSERT_EQ(files.size(), 31u);
   files.push_back(std::string(DEFORM_SOURCE_DIR) + "/tests/data/meshes/cube_tetgen.ele");
   std::set<std::set<Corner>> expected;
   for (const std::string &file : files) {
@@ -69,7 +68,7 @@ TEST(MeshRead, EveryDialect_GivesTheSameBody) {
 }
 
 TEST(MeshRead, PhysicalGroups_KeepNamesCellsAndPoints) {
-  uint32_t checked = 0;
+  std::set<std::string> checked;
   for (const std::string &file : test::own_meshes()) {
     const std::string ending = file.substr(file.size() - 4);
     if (ending != ".msh" && ending != ".vtu" && ending != ".vol") continue;
@@ -93,9 +92,9 @@ TEST(MeshRead, PhysicalGroups_KeepNamesCellsAndPoints) {
       kept.insert({m.tris[t], m.tris[t + 1], m.tris[t + 2]});
     }
     EXPECT_EQ(kept, skin);
-    ++checked;
+    checked.insert(ending);
   }
-  EXPECT_EQ(checked, 21u);
+  EXPECT_EQ(checked.size(), 3u);
 }
 
 TEST(MeshRead, MeditReferences_AreGroupsByNumber) {
