@@ -49,6 +49,16 @@ def stack(n, young=2e5):
                   for i in range(n)], materials={"gel": material(young)})
 
 
+def falling(mu):
+    """Friction falls from 0.6 to mu as contacts slide."""
+    bodies = [block("low", [0.08] * 3, [0, 0, 0.06], velocity=[0.5, 0.2, -1], cells=48),
+              block("high", [0.08, 0.06, 0.06], [0.01, 0, 0.16], velocity=[-0.3, 0.1, -1], cells=48)]
+    for body, axis, angle in zip(bodies, ([1, 2, 0.3], [2, 1, 0.5]), (25, 40)):
+        body["pose"]["rotation"] = {"axis": axis, "angle_deg": angle}
+    return world(bodies, materials={"gel": material(2e6)}, gravity=(1, 0, -9.81),
+                 contact=friction(0.6, mu_S=0.6, mu_C=mu))
+
+
 def ratio(r):
     return world([block("light", [0.1, 0.1, 0.1], [0, 0, 0.001]),
                   block("heavy", [0.1, 0.1, 0.1], [0.02, 0.01, 0.102], "heavy")],
@@ -173,6 +183,8 @@ def runs():
     for law, params in (("karnopp", {}), ("dahl", {}), ("lugre", {}), ("elastoplastic", {})):
         yield f"slope-{law}", slope(law, **params), None, 0.1, 10
         yield f"slope-{law}-implicit", implicit(slope(law, **params)), 0.004, 0.2, 1
+    for mu in (0.2, 0.4):
+        yield f"falls-mu{mu}-implicit", implicit(falling(mu)), 1 / 60, 0.3, 10
     yield "slit", slit(), None, 0.1, 5
     yield "slit-implicit", implicit(slit()), 0.004, 0.2, 1
     for host in ("builtin", "ode", "bullet"):

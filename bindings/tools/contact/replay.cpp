@@ -51,7 +51,7 @@ class Replay final : public SolveLaws {
   LocalProblem form();
 
   bool evaluate_local(const double *response, double slip) override {
-    return !batches_.evaluate_local(p_.h, response, slip, 0, p_.state);
+    return !batches_.evaluate_local(p_.h, response, slip, 0, p_.state, false);
   }
   bool judge(Residual &residual) override {
     set_trial(p_.rows, part_, p_.h, p_.rows.wt.data(), p_.state);

@@ -91,6 +91,11 @@ class Solve final : public SolveLaws {
     rows_.y_free.assign(rows_.y.begin(), rows_.y.end());
     state_.resize(n_, 0);
     std::fill(state_.form.begin(), state_.form.end(), uint8_t{kSetValuedLaw});
+    for (uint32_t i = 0; i < n_; ++i) {  // Coulomb's law: limits in proportion to the normal force
+      state_.fn[i] = 1;
+      state_.limit[i] = problem.mu[i];
+      state_.mode[i] = 1;
+    }
     for (const double q : problem.q) scale_ = std::max(scale_, std::fabs(q));
   }
   // Parts of W that are not symmetric, or that its factor leaves, go into q of the next run. So does a
@@ -126,20 +131,7 @@ class Solve final : public SolveLaws {
     }
   }
 
-  bool evaluate_local(const double *, double) override {
-    ContactState &s = state_;
-    for (uint32_t i = 0; i < n_; ++i) {
-      const uint32_t second = s.stride + i;
-      const double mu = problem_.mu[i], size = cli::plane_length(s.ft_stop[i], s.ft_stop[second]);
-      s.limit[i] = mu * s.fn[i];
-      s.mode[i] = size > s.limit[i] ? 2 : 1;
-      for (const uint32_t at : {i, second}) {
-        s.ft[at] = (s.mode[i] == 2 ? s.limit[i] / size : 1) * s.ft_stop[at];
-        s.dft_dfn[at] = s.mode[i] == 2 ? mu * s.ft_stop[at] / size : 0;
-      }
-    }
-    return true;
-  }
+  bool evaluate_local(const double *, double) override { return true; }  // there is no smooth law
   void spend(uint64_t) override {}
   bool goes_on() override { return true; }
   bool judge(Residual &residual) override {

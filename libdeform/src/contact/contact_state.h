@@ -29,6 +29,9 @@ struct ContactState {
   Array<double> ft_stop;      // [2,stride] N, force that makes the mean slip zero
   Array<double> slip;         // [2,stride] m/s, of the state at which the laws were evaluated
   Array<double> area, dwell;  // m2, s
+  // Where ContactNewton has found a set-valued law to slide: what its neighbors leave is more than it can stop,
+  // though it could if they stood still, which is what ft_stop says.
+  Array<uint8_t> slides;
   // [nstate,stride] law state at the start of the sub-step, nstate = the largest of all laws
   Array<double> bristle;
   // [n] factor on the normal force in the law, if the host scales friction; empty: 1
@@ -45,7 +48,7 @@ struct ContactState {
 
   void use(const Memory &m) {
     use_memory(m, law, fn, vt, ft_stop, area, dwell, bristle, ft, dft_dvt, dft_dfn, limit, bristle_out, mode,
-               form, slip, scale, linear);
+               form, slip, scale, linear, slides);
   }
   void resize(uint32_t count, uint32_t states) {
     n = count;
@@ -59,6 +62,7 @@ struct ContactState {
     law.resize(stride);
     mode.resize(stride);
     form.resize(stride);
+    slides.assign(stride, 0);
     linear.resize(n);
   }
 };

@@ -255,7 +255,7 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
   set_penalties(Set::penalty);
   goal_ = Set::accuracy * tolerance;
   lh_.assign(l_.begin(), l_.end());
-  if (!evaluate(false) || !host_->judge(residual_)) return false;
+  if (!host_->judge(residual_) || !evaluate(false)) return false;
   double left = std::max(residual_.speed, error()), reference = left;  // m/s
   double best = std::numeric_limits<double>::infinity();
   bool spent = false;
@@ -276,6 +276,7 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
       continue;
     }
     put_rows();
+    find_slides();
     for (const Row &r : row_)
       if (r.kind == Kind::drag) limit_drag(*rows_, r.row);
     if (!host_->judge(residual_)) return false;
@@ -353,6 +354,7 @@ bool ContactNewton::penalties_alone(double tolerance, uint32_t steps) {
     if (round) scale_penalties(1 / Set::penalty);
   }
   put_rows();
+  find_slides();
   return host_->judge(residual_);
 }
 

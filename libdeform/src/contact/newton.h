@@ -24,6 +24,7 @@
 
 #include "body/implicit_system.h"
 #include "contact/contact_state.h"
+#include "contact/row_law.h"
 #include "contact/rows.h"
 #include "contact/solver.h"
 #include "math/gmres.h"
@@ -161,6 +162,9 @@ class ContactNewton {
   bool find_residual();
   bool evaluate(bool frozen);
   void evaluate_bond(uint32_t k);
+  Pair stop_of(uint32_t k) const;
+  Disc disc_at(uint32_t k) const;
+  void find_slides();
   void find_slopes(bool frozen);
   void freeze();
   bool set_matrix();

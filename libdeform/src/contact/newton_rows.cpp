@@ -256,6 +256,33 @@ bool ContactNewton::find_residual() {
   return known_ = true;
 }
 
+// N s, the friction impulse that would end the slip of a contact at the present velocities.
+Pair ContactNewton::stop_of(uint32_t k) const {
+  const size_t at = 3 * size_t{k};
+  const double rho = rho_[2 * size_t{k} + 1];
+  return {lh_[at + 1] - rho * u_[at + 1], lh_[at + 2] - rho * u_[at + 2]};
+}
+
+// Of a set-valued law as the pass began with it, at the present normal impulse. A limit that falls with the
+// slip is renewed by passes, as multipliers are: evaluated here, contacts would stick and slip in turns.
+Disc ContactNewton::disc_at(uint32_t k) const {
+  const Pair stop = stop_of(k);
+  const double ln = l_[3 * size_t{k}];
+  if (!(ln > 0)) return {};
+  return disc_of(*state_, row_[k].row, h_, 1 / rho_[2 * size_t{k} + 1],
+                 std::sqrt(stop.a * stop.a + stop.b * stop.b), ln);
+}
+
+void ContactNewton::find_slides() {
+  for (uint32_t k = 0; k < row_.size(); ++k) {
+    const uint32_t i = row_[k].row;
+    if (row_[k].kind != Kind::contact || state_->form[i] != kSetValuedLaw) continue;
+    const Pair stop = stop_of(k);
+    const double radius = rho_[2 * size_t{k} + 1] > 0 ? disc_at(k).radius : 0;
+    state_->slides[i] = radius > 0 && stop.a * stop.a + stop.b * stop.b > radius * radius;
+  }
+}
+
 // g, u, l at v. frozen: with the limits of friction of freeze(). False: a model or a law cannot tell.
 bool ContactNewton::evaluate(bool frozen) {
   ContactState &s = *state_;
@@ -287,13 +314,19 @@ bool ContactNewton::evaluate(bool frozen) {
     if (!(rho > 0)) continue;
     l[0] = normal_impulse(lh[0], u.x + rows_->rate[i], 1 / rho, &rows_->compliance[3 * size_t{i}]);
     l[1] = l[2] = 0;
-    const bool smooth = s.form[i] == kSmoothLaw;
-    s.fn[i] = (frozen && smooth ? frozen_[k] : l[0]) / h_;
-    s.vt[i] = s.slip[i] = u.y;
-    s.vt[stride + i] = s.slip[stride + i] = u.z;
-    s.ft_stop[i] = (lh[1] - rho_t * u.y) / h_;
-    s.ft_stop[stride + i] = (lh[2] - rho_t * u.z) / h_;
-    laws = laws || (s.form[i] != kNoFriction && s.fn[i] > 0 && !(frozen && !smooth));
+    const Pair stop = stop_of(k);
+    if (s.form[i] == kSetValuedLaw && rho_t > 0) {
+      const Pair t = on_disc(stop.a, stop.b, frozen ? frozen_[k] : disc_at(k).radius);
+      l[1] = t.a;
+      l[2] = t.b;
+    } else if (s.form[i] == kSmoothLaw) {
+      s.fn[i] = (frozen ? frozen_[k] : l[0]) / h_;
+      s.vt[i] = s.slip[i] = u.y;
+      s.vt[stride + i] = s.slip[stride + i] = u.z;
+      s.ft_stop[i] = stop.a / h_;
+      s.ft_stop[stride + i] = stop.b / h_;
+      laws = laws || s.fn[i] > 0;
+    }
   }
   // a slip that is off by e is an impulse that is off by rho e
   const double slip = SolveSettings::of_start * goal_ / stiff_;
@@ -306,11 +339,6 @@ bool ContactNewton::evaluate(bool frozen) {
       if (rho_t > 0 && s.fn[i] > 0 && s.form[i] == kSmoothLaw) {
         l[1] = h_ * s.ft[i];
         l[2] = h_ * s.ft[stride + i];
-      } else if (rho_t > 0 && s.form[i] == kSetValuedLaw && (frozen ? frozen_[k] > 0 : l[0] > 0)) {
-        const double radius = frozen ? frozen_[k] : h_ * s.limit[i];
-        const Pair t = on_disc(h_ * s.ft_stop[i], h_ * s.ft_stop[stride + i], radius);
-        l[1] = t.a;
-        l[2] = t.b;
       }
     }
     if (l[0] != 0 || l[1] != 0 || l[2] != 0) add_transposed(k, -load3(l), g_.data());
@@ -327,7 +355,7 @@ void ContactNewton::freeze() {
     const uint32_t i = row_[k].row;
     if (row_[k].kind != Kind::contact) continue;
     const double l = l_[3 * size_t{k}];
-    frozen_[k] = s.form[i] == kSetValuedLaw ? (l > 0 ? h_ * s.limit[i] : 0) : l;
+    frozen_[k] = s.form[i] == kSetValuedLaw && rho_[2 * size_t{k} + 1] > 0 ? disc_at(k).radius : l;
   }
 }
 
@@ -377,30 +405,20 @@ void ContactNewton::find_slopes(bool frozen) {
         G[6] = normal * (x21 * s.dft_dfn[i] + x22 * s.dft_dfn[n + i]);
       }
     } else if (s.form[i] == kSetValuedLaw) {
-      const double radius = frozen ? frozen_[k] : l[0] > 0 ? h_ * s.limit[i] : 0;
-      if (!(radius > 0)) continue;
-      const double a = h_ * s.ft_stop[i], b = h_ * s.ft_stop[n + i], all = std::sqrt(a * a + b * b);
-      if (all <= radius) {
+      const Disc disc = frozen ? Disc{frozen_[k], 0, 0} : disc_at(k);
+      if (!(disc.radius > 0)) continue;
+      const auto [a, b] = stop_of(k);
+      const double all = std::sqrt(a * a + b * b);
+      if (all <= disc.radius) {
         G[4] = G[8] = rho_t;
         continue;
       }
-      const double t1 = a / all, t2 = b / all, across = rho_t * radius / all;
-      G[4] = across * t2 * t2;
-      G[5] = G[7] = -across * t1 * t2;
-      G[8] = across * t1 * t1;
-      if (frozen) continue;
-      const double grows = s.mode[i] == 2 ? limit_growth(s, i) : radius / l[0];
-      G[3] = grows * normal * t1;
-      G[6] = grows * normal * t2;
-      // the limit grows with the speed of a viscous law
-      const double v1 = s.vt[i], v2 = s.vt[n + i], speed = std::sqrt(v1 * v1 + v2 * v2);
-      if (!(speed > 0) || s.mode[i] != 2) continue;
-      const double e1 = v1 / speed, e2 = v2 / speed;
-      const double viscous = viscous_slope(s, i, e1, e2);
-      G[4] -= h_ * viscous * t1 * e1;
-      G[5] -= h_ * viscous * t1 * e2;
-      G[7] -= h_ * viscous * t2 * e1;
-      G[8] -= h_ * viscous * t2 * e2;
+      const double t1 = a / all, t2 = b / all, across = rho_t * disc.radius / all;
+      G[4] = across * t2 * t2 + disc.along * t1 * t1;
+      G[5] = G[7] = (disc.along - across) * t1 * t2;
+      G[8] = across * t1 * t1 + disc.along * t2 * t2;
+      G[3] = disc.grows * normal * t1;
+      G[6] = disc.grows * normal * t2;
     }
   }
 }

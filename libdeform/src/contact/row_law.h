@@ -46,6 +46,30 @@ inline double viscous_slope(const ContactState &s, uint32_t i, double e1, double
                          e2 * (s.dft_dvt[2 * n + i] * e1 + s.dft_dvt[3 * n + i] * e2)));
 }
 
+// Of a set-valued law, the disc of its friction impulse at the normal impulse ln, for an impulse of this size
+// that would stop the slip. radius: N s; grows: of it, with ln; along: N s/m, of it, with the slip, over a
+// response wt.
+struct Disc { double radius, grows, along; };
+inline Disc disc_of(const ContactState &s, uint32_t i, double h, double wt, double size, double ln) {
+  const size_t n = s.stride;
+  const double fn = s.fn[i];
+  if (s.mode[i] != 2) {
+    const double ratio = fn > 0 ? ln / (h * fn) : 0;
+    return {h * s.limit[i] * ratio, fn > 0 ? s.limit[i] / fn : 0, 0};
+  }
+  const double growth = limit_growth(s, i);
+  Disc disc{std::max(0.0, h * s.limit[i] + growth * (ln - h * fn)), growth, 0};
+  const double v1 = s.vt[i], v2 = s.vt[n + i], speed = std::sqrt(v1 * v1 + v2 * v2);
+  const double slope = speed > 0 ? viscous_slope(s, i, v1 / speed, v2 / speed) : 0;
+  if (slope > 0) {
+    const double slip = std::max(0.0, wt * (size - disc.radius + h * slope * speed) / (1 + wt * h * slope));
+    disc.radius = std::max(0.0, disc.radius + h * slope * (slip - speed));
+    disc.along = h * slope / (1 + wt * h * slope);
+    disc.grows /= 1 + wt * h * slope;
+  }
+  return disc;
+}
+
 // The friction impulse by the linearized law, for the present impulse (l1, l2), slip (u1, u2) and new normal
 // impulse of the contact.
 //
@@ -75,19 +99,8 @@ __attribute__((always_inline)) inline Pair friction_impulse(const ContactState &
   const size_t n = s.stride;
   const double fn = s.fn[i];
   if (s.form[i] == kSetValuedLaw) {
-    const double ratio = fn > 0 ? ln / (h * fn) : 0;
     const double a = l1 - u1 / wt, b = l2 - u2 / wt, size = std::sqrt(a * a + b * b);
-    double radius = h * s.limit[i] * ratio;
-    if (s.mode[i] == 2) {
-      radius = std::max(0.0, h * s.limit[i] + limit_growth(s, i) * (ln - h * fn));
-      const double v1 = s.vt[i], v2 = s.vt[n + i], speed = std::sqrt(v1 * v1 + v2 * v2);
-      const double slope = speed > 0 ? viscous_slope(s, i, v1 / speed, v2 / speed) : 0;
-      if (slope > 0) {
-        const double slip = std::max(0.0, wt * (size - radius + h * slope * speed) / (1 + wt * h * slope));
-        radius = std::max(0.0, radius + h * slope * (slip - speed));
-      }
-    }
-    return on_disc(a, b, radius);
+    return on_disc(a, b, disc_of(s, i, h, wt, size, ln).radius);
   }
   if (s.form[i] == kNoFriction) return {0, 0};
   const auto &[slope, m11, m12, m21, m22, det] = s.linear[i];

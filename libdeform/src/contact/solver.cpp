@@ -8,6 +8,13 @@
 #include "contact/solve_settings.h"
 
 namespace dfm {
+namespace {
+
+// Times what would stop a contact that slides: more than any law's limit.
+constexpr double kBeyond = 1e9;
+
+}  // namespace
+
 void set_trial(const ContactRows &rows, const RowsPart &part, double h, const double *response,
                ContactState &s) {
   each_row(part.contacts, [&](uint32_t i) {
@@ -21,9 +28,9 @@ void set_trial(const ContactRows &rows, const RowsPart &part, double h, const do
     s.fn[i] = wn > 0 ? std::max(l[0] > 0 ? l[0] : closing(), SolveSettings::at_rest / wn) / h : 0;
     s.vt[i] = s.slip[i] = u.y;
     s.vt[s.stride + i] = s.slip[s.stride + i] = u.z;
-    const double wt = response[i];
-    s.ft_stop[i] = wt > 0 ? (l[1] - u.y / wt) / h : 0;
-    s.ft_stop[s.stride + i] = wt > 0 ? (l[2] - u.z / wt) / h : 0;
+    const double wt = response[i], beyond = s.slides[i] ? kBeyond : 1;
+    s.ft_stop[i] = wt > 0 ? beyond * (l[1] - u.y / wt) / h : 0;
+    s.ft_stop[s.stride + i] = wt > 0 ? beyond * (l[2] - u.z / wt) / h : 0;
   });
 }
 

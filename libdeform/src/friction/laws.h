@@ -61,8 +61,9 @@ class LawBatches {
   //   wt     [n] 1/kg, how much slip an impulse makes at its own contact; with it ft_stop gives the slip
   //          that others leave
   //   least, relative   m/s, 1: a contact's slip need not be known closer than least + relative of it
+  //   all   false: of smooth laws alone
   const LawInstance *evaluate_local(double h, const double *wt, double least, double relative,
-                                    ContactState &state);
+                                    ContactState &state, bool all = true);
   bool has_smooth() const { return has_smooth_; }
   bool remembers() const { return remembers_; }  // whether any law has a state
   // After a law has failed: the contact whose result is invalid; kNone: the law refused the whole batch.

@@ -59,8 +59,9 @@ void newton_step(const ContactState &s, uint32_t i, double m, double v[2], doubl
 }  // namespace
 
 const LawInstance *LawBatches::evaluate_local(double h, const double *wt, double least, double relative,
-                                              ContactState &state) {
+                                              ContactState &state, bool all) {
   for (const Batch &batch : batches_) {
+    if (!all && batch.law->form() != kSmoothLaw) continue;
     if (batch.law->form() == kNoFriction) {
       set_frictionless({&order_[batch.begin], batch.n}, state);
       continue;

@@ -19,10 +19,10 @@ const Ball kA{2, 0.01, {0.1, 0.02, 0.05}}, kB{3, 0.03, {-0.04, 0.01, -0.1}};
 const Vec3 kAt{0.02, -0.01, 0}, kNormal{0, 0.6, 0.8}, kTangent{1, 0, 0};
 
 // Two free bodies that touch at a place with this velocity of a against b.
-struct Pair {
+struct TwoBodies {
   ContactRows rows{Memory::standard()};
 
-  explicit Pair(Vec3 approach) {
+  explicit TwoBodies(Vec3 approach) {
     const RigidSides contact{{0, 0, kA.center}, {1, 0, kB.center}, kAt, kNormal, kTangent};
     const uint32_t bodies[2] = {1, 1};
     rows.build({}, {}, {{}, bodies}, {}, {&contact, 1});
@@ -65,11 +65,11 @@ struct Pair {
 }  // namespace
 
 TEST(RigidRows, AnImpulse_MovesBothBodiesAtThePlace) {
-  Pair pair({});
+  TwoBodies pair({});
   pair.rows.apply(0, {0.5, -0.2, 0.1});
   pair.expect_momenta_kept();
   const Vec3 third = cross(kNormal, kTangent),
-             moved = Pair::response(0.5 * kNormal - 0.2 * kTangent + 0.1 * third);
+             moved = TwoBodies::response(0.5 * kNormal - 0.2 * kTangent + 0.1 * third);
   const Vec3 u = pair.rows.velocity(0);
   EXPECT_NEAR(u.x, dot(kNormal, moved), 1e-14);
   EXPECT_NEAR(u.y, dot(kTangent, moved), 1e-14);
@@ -80,7 +80,7 @@ TEST(RigidRows, TwoBodiesThatMeet_StopAndStickOrSlide) {
   for (const double mu : {0.0, 0.2, 5.0}) {
     SCOPED_TRACE(mu);
     for (const bool turns : {false, true}) {
-      Pair pair({0.3, -0.5, -1});
+      TwoBodies pair({0.3, -0.5, -1});
       ContactRows &rows = pair.rows;
       if (turns) {  // what a's spin adds to the velocity of the place
         rows.arc.assign(9, 0.0);

@@ -83,6 +83,7 @@ void start_island(const World &w, StepContext &step, SolveIsland &own) {
   own.world = &w;
   own.step = &step;
   if (own.implicit) begin_newton(step, own);
+  each_row(own.part.contacts, [&](uint32_t i) { step.state.slides[i] = 0; });
   evaluate_laws(w, step, own);
 }
 
@@ -166,7 +167,7 @@ void solve_island(const World &w, StepContext &step, SolveIsland &own) {
 }  // namespace
 
 bool SolveIsland::evaluate_local(const double *response, double slip) {
-  bad = batches.evaluate_local(step->h, response, slip, 0, step->state);
+  bad = batches.evaluate_local(step->h, response, slip, 0, step->state, false);
   return !bad;
 }
 
