@@ -29,8 +29,8 @@ struct ContactState {
   Array<double> ft_stop;      // [2,stride] N, force that makes the mean slip zero
   Array<double> slip;         // [2,stride] m/s, of the state at which the laws were evaluated
   Array<double> area, dwell;  // m2, s
-  // Where ContactNewton has found a set-valued law to slide: what its neighbors leave is more than it can stop,
-  // though it could if they stood still, which is what ft_stop says.
+  // Where ContactNewton has found a set-valued law to slide. By ft_stop alone, which takes all others to hold
+  // still, the law might stop it.
   Array<uint8_t> slides;
   // [nstate,stride] law state at the start of the sub-step, nstate = the largest of all laws
   Array<double> bristle;
