@@ -164,13 +164,13 @@ ports: ports-built
 	cmake --preset release
 	$(BUILD) release --target deform_command $(EXAMPLES)
 	@ctest --test-dir build/release --output-on-failure --no-tests=error -R '^ports\.(arm64|windows)'
+	@ctest --preset arm64 -j $(JOBS)
 
-# With arm64's own tests. Those that compare with the native build are among soak's own.
+# The tests that compare with the native build are among soak's own.
 ports-built: setup-ports build/arm64/build.ninja build/windows/build.ninja
 	$(BUILD) arm64
 	$(BUILD) windows
 	$(call wheel_of,$(CURDIR)/build/windows,build/windows/dist)
-	@ctest --preset arm64 -j $(JOBS)
 
 # What a release ships, from the source archive; compiles twice, in two folders, and compares.
 packages: setup

@@ -124,7 +124,7 @@ TEST(RigidReports, ImpulsesOfPairs_AreTheMomentumThatABodyGets) {
         EXPECT_EQ(test::listed(dfm_world_obstacles, w)[c.feature_a], r);
         EXPECT_EQ(test::listed(dfm_world_obstacles, w)[c.feature_b], ground);
         EXPECT_NEAR(c.normal[2], 1, 1e-6);
-        EXPECT_NEAR(c.gap, 0, 1e-9);
+        EXPECT_NEAR(c.gap, 0, 2e-6 * dt);  // what the arcs of its landing leave, 1e-6 m/s, stays
         EXPECT_EQ(c.flags, uint32_t(DFM_CONTACT_STICKING));
       }
       double on_crate[3], on_ground[3], turns[3];

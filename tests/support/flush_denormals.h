@@ -10,4 +10,6 @@ static inline void flush_denormals(void) {
   __asm__ volatile("mrs %0, fpcr" : "=r"(control));
   __asm__ volatile("msr fpcr, %0" : : "r"(control | 1ul << 24));
 }
+#else
+static inline void flush_denormals(void) {}
 #endif

@@ -103,9 +103,9 @@ bool cell_weights(uint32_t nodes, Vec3 x, const Vec3 *c, Vec3 &at, double *w) {
   const double near2 = 1e-28 * length2(nodes, c);
   at = nodes == 10 ? Vec3{0.25, 0.25, 0.25} : Vec3{};
   for (int step = 0; step < kSteps; ++step) {
-    Vec3 left = x, along[3], slope[kMaxNodes];
+    Vec3 left = x - c[0], along[3], slope[kMaxNodes];
     cell_shapes(nodes, at, w, slope);
-    for (uint32_t k = 0; k < nodes; ++k) left -= w[k] * c[k];
+    for (uint32_t k = 1; k < nodes; ++k) left -= w[k] * (c[k] - c[0]);  // c[0] may lie far away
     if (norm2(left) <= near2) return true;
     for (uint32_t k = 0; k < nodes; ++k) {
       along[0] += slope[k].x * c[k];

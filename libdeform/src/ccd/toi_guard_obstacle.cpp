@@ -145,7 +145,7 @@ class Judge {
     }
   }
   void feature(uint32_t candidate, uint32_t part, const narrow::PairMotion &m) {
-    if (m.far_apart(scene_.floor) || !(m.distance(0) > 0)) return;
+    if (m.far_apart(scene_.floor) || !(m.start() > 0)) return;
     GuardHit hit{candidate, part, 0, 0, 0, {}};
     const auto touch = [&](double d, double within) { return m.touch(d, within); };
     const bool trips = narrow::judge(touch, [&] { return m.distance(0); }, scene_.floor, scene_.margin, hit);

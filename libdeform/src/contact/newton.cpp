@@ -288,6 +288,8 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
       best_v_.assign(v_.begin(), v_.end());
       best_g_.assign(g_.begin(), g_.end());
       best_l_.assign(l_.begin(), l_.end());
+      best_slides_.clear();
+      for (const Row &r : row_) best_slides_.push_back(r.kind == Kind::contact && state_->slides[r.row]);
     }
     report();
     if (found_ || steps_ >= limit_ || (spent = !host_->goes_on())) break;
@@ -316,6 +318,8 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
     g_.swap(best_g_);
     l_.swap(best_l_);
     put_rows();
+    for (size_t k = 0; k < row_.size(); ++k)
+      if (row_[k].kind == Kind::contact) state_->slides[row_[k].row] = best_slides_[k];
     if (!host_->judge(residual_)) return false;
   }
   if (found_ && residual_.required > 1) residual_.required = residual_.relative = 1;

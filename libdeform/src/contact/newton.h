@@ -7,8 +7,9 @@
 // moves by itself, a point of an implicit body, or three motions of a body that is known by its response.
 //
 //   outer pass    with multipliers lh and penalties rho (kg): v with g = 0, l_i(v) = P_i(lh_i - rho_i u_i),
-//                 then lh <- l(v). The normal part of P is the positive part, the friction part the law at
-//                 the normal impulse of this pass and the slip u + (l - lh)/rho.
+//                 then lh <- l(v). The normal part of P is the positive part, the friction part a smooth law
+//                 at the normal impulse of this pass and the slip u + (l - lh)/rho, or the disc that a
+//                 set-valued law has at the start of the pass.
 //   Newton step   (A + J'GJ) d = -g, G = -dl/du, by GMRES with the last factor of A + J' sym(G) J,
 //                 or, of many points, with conjugate gradients on that matrix. It is taken where it makes g
 //                 smaller. Where it does not, limits of friction are frozen: g is then the gradient of a
@@ -37,9 +38,9 @@ namespace dfm {
 class SolveLaws {
  public:
   virtual ~SolveLaws() = default;
-  // Evaluates the laws at the state's fn where slip and force lie on the line of ft_stop with these responses
-  // [rows], 1/kg (friction/local_solve.cpp); their slopes there. slip: m/s, that slips may be off by. False:
-  // a law has failed.
+  // Evaluates smooth laws at the state's fn where slip and force lie on the line of ft_stop with these
+  // responses [rows], 1/kg (friction/local_solve.cpp); their slopes there. slip: m/s, that slips may be off
+  // by. False: a law has failed.
   virtual bool evaluate_local(const double *response, double slip) = 0;
   // The residual of rows.impulse at rows.y; the state then has the laws there. False: a law has failed.
   virtual bool judge(Residual &residual) = 0;
@@ -105,6 +106,7 @@ class ContactNewton {
   Array<double> inverse_;                   // [nodes,3] of A's diagonal; zero where held
   Array<double> u_, l_, lh_;                // [row_,3]
   Array<double> best_v_, best_g_, best_l_;  // of the pass that leaves least
+  Array<uint8_t> best_slides_;              // [row_]
   Array<double> rho_;                       // [row_,2]
   Array<double> response_;                  // [rows] 1/rho_t, by row
   Array<double> slope_;                     // [row_,9] G, row-major

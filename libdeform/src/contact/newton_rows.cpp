@@ -20,7 +20,7 @@ ContactNewton::ContactNewton(const Memory &m, Tasks *tasks) : factor_(m), levels
   use_memory(m, node_of_dof_, dof_of_node_, row_, entry_, node_, jac_, seen_, bias_, heavy_, v_, base_, g_,
              kept_, way_, minus_, inverse_, u_, l_, lh_, best_v_, best_g_, best_l_, rho_, response_, slope_,
              frozen_, pairs_, begin_, by_lower_, number_, higher_, ij_, place_, blocks_, matrix_, places_,
-             analysed_, r_, base_r_, of_v_, row_of_, begin_entry_, entry_by_node_, stiff_jac_);
+             analysed_, best_slides_, r_, base_r_, of_v_, row_of_, begin_entry_, entry_by_node_, stiff_jac_);
   use_memory(m, motions_.g, motions_.s, motions_.touched, motions_.columns, motions_.left,
              motions_.first_column, motions_.column_count, motions_.first_value);
 }

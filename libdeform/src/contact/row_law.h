@@ -47,8 +47,8 @@ inline double viscous_slope(const ContactState &s, uint32_t i, double e1, double
 }
 
 // Of a set-valued law, the disc of its friction impulse at the normal impulse ln, for an impulse of this size
-// that would stop the slip. radius: N s; grows: of it, with ln; along: N s/m, of it, with the slip, over a
-// response wt.
+// that would stop the slip. radius: N s; grows: of it, with ln; along: kg, of it, with the slip that others
+// leave, over a response wt.
 struct Disc { double radius, grows, along; };
 inline Disc disc_of(const ContactState &s, uint32_t i, double h, double wt, double size, double ln) {
   const size_t n = s.stride;

@@ -40,6 +40,11 @@ void begin_newton(StepContext &step, SolveIsland &own) {
   own.newton->begin(step.rows, own.part, step.systems, step.state, own, step.h);
 }
 
+// What a Newton solve has found.
+void clear_slides(StepContext &step, const SolveIsland &own) {
+  each_row(own.part.contacts, [&](uint32_t i) { step.state.slides[i] = 0; });
+}
+
 // After sweeps. Where rows contradict each other, the better result counts. tolerance, normal: m/s, as of
 // ContactNewton::solve().
 void solve_rigid(StepContext &step, SolveIsland &own, double tolerance, double normal) {
@@ -54,6 +59,7 @@ void solve_rigid(StepContext &step, SolveIsland &own, double tolerance, double n
   if (found && !own.bad && own.residual.speed <= swept) return;
   own.bad = nullptr;  // a law that fails on the way need not fail there
   put_impulses(step.rows, own.part, own.swept.data());
+  clear_slides(step, own);
   own.judge(own.residual);
 }
 
@@ -83,7 +89,7 @@ void start_island(const World &w, StepContext &step, SolveIsland &own) {
   own.world = &w;
   own.step = &step;
   if (own.implicit) begin_newton(step, own);
-  each_row(own.part.contacts, [&](uint32_t i) { step.state.slides[i] = 0; });
+  clear_slides(step, own);
   evaluate_laws(w, step, own);
 }
 
