@@ -243,7 +243,7 @@ TEST_P(GpuWorld, LiftedByAGrasper_PullsAsOnTheProcessor) {
     const dfm_tool jaws = test::tools::make(w.world, d);
     for (int n = 1; n <= 600; ++n) {
       const double t = 2e-3 * n;
-      test::ok(dfm_tool_set_opening(jaws, std::max(0.27 - 0.5 * t, 0.2)));
+      test::ok(dfm_tool_set_opening(jaws, std::max(0.27 - 0.5 * t, 0.17)));
       d.pose.position[2] = 0.51 + 0.2 * std::clamp(t - 0.2, 0.0, 0.2);
       test::ok(dfm_tool_set_pose(jaws, &d.pose, nullptr));
       ASSERT_EQ(dfm_world_step(w.world, 2e-3, nullptr), DFM_OK) << dfm_last_error();
@@ -258,8 +258,9 @@ TEST_P(GpuWorld, LiftedByAGrasper_PullsAsOnTheProcessor) {
   ASSERT_EQ(felt[0].size(), 8u);
   ASSERT_EQ(felt[1].size(), 8u);
   for (size_t k = 0; k < 8; ++k) {
-    const double *const of = &felt[0][k / 3 * 3];
-    const double whole = k < 6 ? std::hypot(of[0], of[1], of[2]) : felt[0][k];
+    // a torque by the weight at the cube's edge: jaws yield, so where between them it comes to rest is soft
+    const double weight = std::hypot(felt[0][0], felt[0][1], felt[0][2]);
+    const double whole = k < 3 ? weight : k < 6 ? 0.1 * weight : felt[0][k];
     EXPECT_NEAR(felt[1][k], felt[0][k], 0.01 * whole) << k;
   }
 }
