@@ -89,6 +89,7 @@ void expect_stays(const char *model, double young, int32_t integrator, double st
                            std::to_string(integrator) + ", " + std::to_string(step) + " s, " +
                            std::to_string(depth) + " m";
   EXPECT_LT(fastest(world, upper, std::max(0.03, 3 * step), step), kMax) << what;
+  EXPECT_GT(stats(world).contacts, 0u) << what;
   EXPECT_EQ(stats(world).guard_solves, 0u) << what;
 }
 

@@ -18,16 +18,7 @@ dfm_tool_def table() {
 }
 
 dfm_tool_def grasper(double high) {
-  dfm_tool_def d = dfm_tool_def_default();
-  d.name = "grasper";
-  d.shape = DFM_TOOL_GRASPER;
-  d.half_size[0] = 0.003;
-  d.half_size[1] = 0.006;
-  d.half_size[2] = 0.02;
-  d.radius = 0;
-  d.opening = 0.4;
-  d.pose = pose({0, 0, high});
-  return d;
+  return test::tools::grasper({0.003, 0.006, 0.02}, 0.4, pose({0, 0, high}));
 }
 
 struct Thing {
@@ -219,6 +210,7 @@ TEST(ToolLift, JawsThatCloseOnABar_DoNotShootItOut) {
         most = std::max(most, test::measure(bar).kinetic);
       }
       EXPECT_LT(most, 1e-5) << "J";
+      EXPECT_GT(test::stats(w).contacts, 0u) << "it stays between them";
       EXPECT_EQ(test::stats(w).unconverged, 0u);
     }
 }

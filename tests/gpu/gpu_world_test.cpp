@@ -232,14 +232,8 @@ TEST_P(GpuWorld, LiftedByAGrasper_PullsAsOnTheProcessor) {
   for (const bool card : {false, true}) {
     World w(card ? GetParam() : on_the_processor(GetParam()), device(), "coulomb", 0.8, {0, 0, -9.81}, 1e-4,
             1e5);
-    dfm_tool_def d = dfm_tool_def_default();
-    d.shape = DFM_TOOL_GRASPER;
-    d.half_size[0] = 0.01;
-    d.half_size[1] = 0.03;
-    d.half_size[2] = 0.25;
-    d.radius = 0;
-    d.opening = 0.27;
-    d.pose = test::tools::pose({0.05, 0.04, 0.51});
+    const dfm_pose start = test::tools::pose({0.05, 0.04, 0.51});
+    dfm_tool_def d = test::tools::grasper({0.01, 0.03, 0.25}, 0.27, start);
     const dfm_tool jaws = test::tools::make(w.world, d);
     for (int n = 1; n <= 600; ++n) {
       const double t = 2e-3 * n;

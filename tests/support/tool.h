@@ -18,6 +18,18 @@ inline dfm_pose pose(Vec at, Vec axis = {0, 0, 1}, double angle = 0) {
   return {{at[0], at[1], at[2]}, {s * axis[0], s * axis[1], s * axis[2], std::cos(0.5 * angle)}};
 }
 
+// Two jaws, of these half sizes, without a shaft. opening: rad.
+inline dfm_tool_def grasper(Vec half, double opening, const dfm_pose &at) {
+  dfm_tool_def d = dfm_tool_def_default();
+  d.name = "grasper";
+  d.shape = DFM_TOOL_GRASPER;
+  for (size_t k = 0; k < 3; ++k) d.half_size[k] = half[k];
+  d.radius = 0;
+  d.opening = opening;
+  d.pose = at;
+  return d;
+}
+
 // The triangles of a box, and the def that has them.
 struct BoxMesh {
   double points[24];

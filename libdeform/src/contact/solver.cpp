@@ -117,8 +117,8 @@ void each_side(const uint32_t *sides, uint32_t i, T *start_residual, F &&f) {
 
 }  // namespace
 
-void find_disturbance(const ContactRows &rows, const RowsPart &part, const ContactState &law, double h,
-                      const uint32_t *sides, double *start_residual) {
+void find_start_residual(const ContactRows &rows, const RowsPart &part, const ContactState &law, double h,
+                         const uint32_t *sides, double *start_residual) {
   each_row(part.contacts, [&](uint32_t i) {
     if (!(rows.wn[i] > 0)) return;
     const Vec3 u = rows.velocity(i);

@@ -47,8 +47,8 @@ Residual larger(const Residual &a, const Residual &b);
 // d of the bodies of a part: the largest r_t that the warm start leaves at any contact of the body, and the
 // largest of all r_n and r_t; no less than start_residual has already. sides: [contacts,2] numbers of bodies,
 // kNone: an obstacle; start_residual: [bodies,2].
-void find_disturbance(const ContactRows &rows, const RowsPart &part, const ContactState &law, double h,
-                      const uint32_t *sides, double *start_residual);
+void find_start_residual(const ContactRows &rows, const RowsPart &part, const ContactState &law, double h,
+                         const uint32_t *sides, double *start_residual);
 // tangent[i] = max(bounds.tangent, 1e-2 d), d the larger one of the two bodies. A contact at rest is warm
 // started at its solution, so d vanishes and the bound at rest rules; while bodies shake, a hundredth of what
 // the sub-step changes is enough, and what is left is part of the next sub-step's d. normal[i] =

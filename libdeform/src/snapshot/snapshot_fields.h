@@ -304,7 +304,7 @@ void body_fields(Stream &s, W &w, B &b, const Body &like) {
   s.value("kinetic energy", b.energy.kinetic, must::finite);
   s.must_hold("energy known", "what the energy watch writes", [&] { return is_valid(b.energy); });
   s.value("model has changed", b.changes.open, must::flag);
-  s.value("refusal told", b.changes.reported, must::flag);
+  s.value("refusal reported", b.changes.reported, must::flag);
   s.value("largest energy", b.changes.largest, must::not_negative);
   for (auto *x : {&b.changes.unpaid, &b.changes.level, &b.changes.work})
     s.value("energy of changes", *x, must::finite);
@@ -354,7 +354,7 @@ void body_fields(Stream &s, W &w, B &b, const Body &like) {
   s.must_hold("parts wait for memory", "parts of a body that separates",
               [&] { return !b.separate.waits || b.separate.on; });
   s.value("asleep", b.sleep_state.asleep, must::flag);
-  s.value("calm", b.sleep_state.quiet_time, must::not_negative);
+  s.value("time at rest", b.sleep_state.quiet_time, must::not_negative);
   s.value("asleep since", b.sleep_state.since, must::not_negative);
   s.value("sub-step asleep", b.sleep_state.h, must::not_negative);
   s.value("force asleep", b.sleep_state.force, must::finite);
@@ -452,7 +452,7 @@ void fields(Stream &s, W &w, const World &like) {
               [&] { return w.bound.age == kNone || w.bound.step >= kMinStep; });
   for (auto *r : {&w.sizes.cut, &w.sizes.offer}) {
     s.value("step size", r->size, must::not_negative);
-    s.value("calm of the size", r->quiet_steps, must::any);
+    s.value("quiet steps of the size", r->quiet_steps, must::any);
     s.value("patience", r->patience, must::any);
   }
   s.value("accurate step", w.sizes.accurate, must::not_negative);

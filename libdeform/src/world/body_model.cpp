@@ -167,7 +167,7 @@ std::vector<double> values_for(const World &w, const Body &b, const dfm_type &ty
 }
 
 // An instance that the body had before with the same inputs, or none.
-bool take_spare(Body &b, const dfm_type &type, const std::vector<double> &values, MadeModel &out) {
+bool take_cached(Body &b, const dfm_type &type, const std::vector<double> &values, MadeModel &out) {
   const ModelOrigin &origin = out.origin;
   const bool turns = rests_unplaced(type);
   const auto fits = [&](const CachedModel &s) {
@@ -218,7 +218,7 @@ void make_instance(World &w, Body &b, const dfm_type &type, std::vector<double> 
   mesh.fixed = out.origin.held.data();
   mesh.inside = b.inside.empty() ? nullptr : b.inside.data();
   coupling.fill_mesh(mesh);
-  if (!take_spare(b, type, values, out)) out.model.create(type, w.context->host, mesh, m, std::move(values));
+  if (!take_cached(b, type, values, out)) out.model.create(type, w.context->host, mesh, m, std::move(values));
   if (needs_single(type, out.origin.params)) out.model.use_single();
 }
 

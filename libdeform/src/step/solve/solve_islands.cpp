@@ -338,8 +338,8 @@ const SolveIsland *solve_islands(World &w, StepContext &step) {
   // tolerances of a body follow from all of its islands
   for (SolveIsland &own : all)
     if (own.open && !own.bad)
-      find_disturbance(step.rows, own.part, step.state, step.h, step.solve_islands->sides(),
-                       step.start_residual.data());
+      find_start_residual(step.rows, own.part, step.state, step.h, step.solve_islands->sides(),
+                          step.start_residual.data());
   run([&](SolveIsland &own) {
     solve_island(w, step, own);
     limit_work(step, own);
