@@ -348,6 +348,45 @@ TEST(RigidJoints, ADoorInItsPost_Opens) {
   }
 }
 
+// A plate that is led along the hinge of a gate, or onto a box that lies on a floor: the two have no way to
+// go. The step says so, and leaves the state as it was before it.
+TEST(RigidJoints, WhatCannotYieldToADrivenPlate_EndsTheRun) {
+  for (const double dt : kStep)
+    for (const bool hinged : {true, false}) {
+      SCOPED_TRACE(std::to_string(dt) + (hinged ? " hinged" : " on a floor"));
+      test::Context context;
+      const dfm_world w = test::make_world(context, {0, 0, -kG});
+      const dfm_rigid_def gate = test::box("gate", {0.1, 0.02, 0.1}, 1, {0, 0, 0.11});
+      const dfm_joint_def hinge = test::joint(DFM_JOINT_HINGE, 0, DFM_RIGID_WORLD, {0, 0, 0.11}, {0, 0, 1});
+      if (!hinged) test::add_plane(w, "floor");
+      const dfm_rigid body = test::create(
+          w, {gate}, hinged ? std::vector<dfm_joint_def>{hinge} : std::vector<dfm_joint_def>{})[0];
+      dfm_obstacle_def d = dfm_obstacle_def_default();
+      d.name = "plate";
+      d.shape = DFM_SHAPE_BOX;
+      std::fill_n(d.half_size, 3, 0.05);
+      const dfm_pose_key keys[] = {{0, pose({0, 0, 0.3})}, {1, pose({0, 0, 0.1})}};
+      d.keys = keys;
+      d.nkey = 2;
+      dfm_obstacle plate = 0;
+      test::ok(dfm_obstacle_create(w, &d, &plate));
+      dfm_status status = DFM_OK;
+      dfm_rigid_state before{};
+      while (status == DFM_OK && dfm_world_time(w) < 1) {
+        before = test::state(body);
+        status = dfm_world_step(w, dt, nullptr);
+      }
+      EXPECT_NE(status, DFM_OK);
+      const std::string told = dfm_last_error();
+      EXPECT_NE(told.find("squeezed until nothing can move"), std::string::npos) << told;
+      EXPECT_NE(told.find("gate"), std::string::npos) << told;
+      EXPECT_NEAR(test::state(body).position[2], 0.11, hinged ? 1e-9 : 0.011);
+      dfm_pose at{};
+      test::ok(dfm_obstacle_get_pose(plate, &at));
+      EXPECT_GT(at.position[2] - 0.05, test::state(body).position[2] + 0.1 - 1e-4);
+    }
+}
+
 // An arm that a motor turns until it meets a stop: a snapshot knows the motor, whatever it has become since,
 // and so does a world made anew.
 // unsanitized: too slow there; shorter tests run the same code

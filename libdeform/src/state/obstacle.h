@@ -58,7 +58,7 @@ struct Obstacle : ObstacleState {
   // Of a sub-step, in a step whose remaining time from t is `left`. rest: s, to the end of the planned
   // sub-step, of which this is a piece if h is less. The obstacle goes straight to where it has to be then:
   // what it was held back earlier, it catches up in that time and not in the first piece, however short.
-  Pose end_pose(double t, double h, double left, double rest) const;
+  Pose end_pose(double h, double left, double rest) const;
 };
 
 }  // namespace dfm

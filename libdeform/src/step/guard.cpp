@@ -398,15 +398,7 @@ bool wake_hit(World &w, StepContext &step) {
 bool jammed(const World &w, const StepContext &step) {
   if (!(step.guard.motion < kNoWay && step.h > 0.5 * step.length.planned && step.residual.required > 1))
     return false;
-  // contact may have an answer that the budget has not let it find
-  if (step.budget.divided && step.budget.cheapened) return false;
-  const auto prescribed = [&](const Obstacle &o) {
-    return !o.rigid || std::any_of(w.tools.begin(), w.tools.end(),
-                                   [&](const auto &t) { return t->set == o.rigid && !t->motion.coupled(); });
-  };
-  for (size_t o = 0; o < w.obstacles.size(); ++o)
-    if (step.obstacle_views[o].moves() && prescribed(*w.obstacles[o])) return true;
-  return !step.driven.empty();
+  return !step.budget.cuts_solves() && has_prescribed_motion(w, step);
 }
 
 // The fraction of the way that leaves no hit, by checks as far as the budget holds them; else none. safe: the
@@ -427,6 +419,17 @@ void take_safe_part(World &w, StepContext &step, bool lets_slits, double safe) {
 
 bool cross_at_start(StepContext &step, uint32_t slot_a, uint32_t slot_b, bool obstacle) {
   return !crossing(step, slot_a, slot_b, obstacle).triangles.empty();
+}
+
+bool has_prescribed_motion(const World &w, const StepContext &step) {
+  const auto prescribed = [&](const Obstacle &o) {
+    return !o.rigid || std::ranges::any_of(w.tools, [&](const auto &t) {
+      return t->set == o.rigid && !t->motion.coupled();
+    });
+  };
+  return !step.driven.empty() || std::ranges::any_of(w.obstacles, [&](const auto &o) {
+    return step.obstacle_views[o->slot].moves() && prescribed(*o);
+  });
 }
 
 void follow_pairs(World &w, StepContext &step, bool fresh) {
@@ -500,7 +503,6 @@ Next stage_guard(World &w, StepContext &step, uint32_t *trouble) {
   }
   if (jammed(w, step)) return go_on(report_jam(w, step, trouble));
   if (!withstands_impacts(w, step)) return Next::stop;
-  w.stats.guard_lost += (1 - step.guard.motion) * step.h;
   return Next::stage;
 }
 

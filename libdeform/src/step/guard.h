@@ -68,6 +68,9 @@ bool cross_at_start(StepContext &step, uint32_t slot_a, uint32_t slot_b, bool ob
 // Guard::memory follows all pairs that may come near, before the narrow phase and before the guard's checks:
 // candidates of two sides, then those of bodies with themselves. fresh: lists of the latter have changed.
 void follow_pairs(World &w, StepContext &step, bool fresh);
+// Whether held points or obstacles move as prescribed: then contact may have no solution, because free bodies
+// and coupled tools yield.
+bool has_prescribed_motion(const World &w, const StepContext &step);
 // Finds guard.common of body i, beside its end, if it moves so far that the guard needs it.
 void check_motion(const World &w, StepContext &step, uint32_t i);
 // guard_hits.cpp: the earliest hits as contacts of the sub-step, among those that it has.

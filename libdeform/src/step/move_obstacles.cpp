@@ -8,10 +8,10 @@
 
 namespace dfm {
 
-Pose Obstacle::end_pose(double t, double h, double left, double rest) const {
+Pose Obstacle::end_pose(double h, double left, double rest) const {
   if (rigid) return shape_pose(*this, rigid->next[rigid_body]);
   if (!has_target && !moves()) return pose;
-  const Pose end = has_target ? target : pose_at_time(world->prescribed.at(t + rest));
+  const Pose end = has_target ? target : pose_at_time(world->motion_time(rest));
   if (!has_target && !(h < rest)) return end;
   const double s = h / (has_target ? left : rest);
   return {pose.position + s * (end.position - pose.position),
@@ -19,7 +19,7 @@ Pose Obstacle::end_pose(double t, double h, double left, double rest) const {
 }
 
 Pose end_pose(const World &w, const StepContext &step, const Obstacle &o) {
-  return o.end_pose(w.time, step.h, step.left, step.rest);
+  return o.end_pose(step.h, step.left, step.rest);
 }
 
 void view_obstacles(World &w, StepContext &step) {

@@ -52,7 +52,7 @@ bool stage_motion(World &w, StepContext &step, uint32_t *) {
       }
       set(end);
     }
-    each_held_place(*b, w.prescribed.at(w.time + step.rest), [&](uint32_t point, Vec3 to) {
+    each_held_place(*b, w.motion_time(step.rest), [&](uint32_t point, Vec3 to) {
       const size_t at = size_t(point) * kStride;
       const Vec3 v = (1 / step.rest) * (to - load3(&b->p.x[at]));
       for (int k = 0; k < 3; ++k)

@@ -108,7 +108,7 @@ double start_depth(const World &w, const StepContext &step, const ContactPoint &
 // As fail_step(). law: failed at this contact, or kNone; null: a value is not finite.
 bool report_failed_solve(World &w, StepContext &step, const LawInstance *law, uint32_t contact,
                          uint32_t *trouble);
-// As fail_step(): the guard allows no further motion, and the contact solve has no solution.
+// As fail_step(): the contact solve has no solution, and nothing can move any further.
 bool report_jam(World &w, StepContext &step, uint32_t *trouble);
 void reserve_contacts(World &w, StepContext &step);  // memory for keep_contacts()
 // Of lists to which keep_contacts() and keep_rigids() add.

@@ -298,10 +298,10 @@ namespace {
 // of the step, which ends at `goal`.
 bool advance(World &w, StepContext &step, double end, double goal, bool last, uint32_t *trouble) {
   step.guard.cuts = 0;
-  step.guard.motion = 1;
   step.length.begin(end - w.time);
   double planned = step.length.planned;
   for (bool whole = false; !whole;) {
+    step.guard.motion = 1;
     prepare_released(w);
     step.rest = step.h = end - w.time;
     step.left = goal - w.time;
@@ -327,6 +327,7 @@ bool advance(World &w, StepContext &step, double end, double goal, bool last, ui
     if (step.guard.motion < 1) move_obstacles_by(w, step, step.guard.motion);
     else move_obstacles(w, step, whole && last);
     w.time = whole ? end : w.time + step.h;
+    if (!w.prescribed.is_static()) w.stats.guard_lost += (1 - step.guard.motion) * step.h;
     ++w.stats.substeps;
     ++w.bound.age;
     if (ends_here(w, step) && !(whole && last)) return true;

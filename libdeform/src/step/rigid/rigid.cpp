@@ -215,6 +215,7 @@ Next stage_rigid_commit(World &w, StepContext &step, uint32_t *trouble) {
   }
   step.rigid_rounds = 0;
   if (!step.tools->follows_arcs(w, step) || !step.tools->stays_out(w, step)) return Next::stop;
+  if (step.tools->jams(w, step)) return go_on(report_jam(w, step, trouble));
   step.tools->turn_jaws();
   reserve_reports(w, step);
   // From here on (guard) their true motion is used.

@@ -520,6 +520,16 @@ bool ToolTouch::follows_arcs(const World &w, StepContext &step) const {
   return false;
 }
 
+// Rows without a response take no part in the solve, and one without a solution ends at its budget. Both leave
+// what closes.
+bool ToolTouch::jams(const World &w, const StepContext &step) const {
+  const double slow = normal_at_rest(w, h_);
+  return !step.budget.cuts_solves() && has_prescribed_motion(w, step) && std::ranges::any_of(rows_, [&](const Row &row) {
+    const double closes = -dot(row.normal, speed(row));
+    return closes > slow && h_ * closes - row.gap > offset_;
+  });
+}
+
 bool ToolTouch::begin(World &w, StepContext &step) {
   rows_.clear();
   off_ = left_ = 0;

@@ -85,6 +85,8 @@ class ToolTouch {
   // Called after the hosts have ended their sub-step: whether nothing that yields has met on its way what its
   // rows do not keep it apart from. False: as for begin().
   bool stays_out(World &w, StepContext &step);
+  // Whether things that are deep in each other go deeper, because what drives them leaves them no way.
+  bool jams(const World &w, const StepContext &step) const;
   // Turns the ends of the jaws.
   void turn_jaws();
   // Called at the end of an accepted sub-step: moves what lasts to the world.

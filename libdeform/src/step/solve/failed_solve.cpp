@@ -80,7 +80,7 @@ bool report_failed_solve(World &w, StepContext &step, const LawInstance *law, ui
 
 bool report_jam(World &w, StepContext &step, uint32_t *trouble) {
   uint32_t worst = kNone;
-  for (uint32_t i = 0; i < step.rows.soft(); ++i)
+  for (uint32_t i = 0; i < step.rows.n; ++i)
     if (worst == kNone || step.rows.impulse[3 * size_t{i}] > step.rows.impulse[3 * size_t{worst}]) worst = i;
   const ContactPoint *const c = worst < step.contacts.size() ? &step.contacts[worst] : nullptr;
   return fail_step(
