@@ -188,8 +188,8 @@ struct Derived {
 
 struct World : WorldMemory, WorldState, Entities, Rules, Derived {
   uint64_t handle = 0;
-  // s: prescribed motions at the end of the next h. They lag behind the clock by the motion that the guard has
-  // removed, so that nothing has to catch up at a speed that nobody has prescribed.
+  // s: the time of keys of motions at the end of the next h. It lags behind the clock by the motion that the
+  // guard has removed, so that nothing has to catch up at a speed that nobody has prescribed.
   double motion_time(double h) const { return prescribed.at(time + h) - stats.guard_lost; }
   std::vector<Sensed> sensed;  // at the end of the last step
   Overlaps overlaps;

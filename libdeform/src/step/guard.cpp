@@ -423,9 +423,8 @@ bool cross_at_start(StepContext &step, uint32_t slot_a, uint32_t slot_b, bool ob
 
 bool has_prescribed_motion(const World &w, const StepContext &step) {
   const auto prescribed = [&](const Obstacle &o) {
-    return !o.rigid || std::ranges::any_of(w.tools, [&](const auto &t) {
-      return t->set == o.rigid && !t->motion.coupled();
-    });
+    return !o.rigid || std::ranges::any_of(
+                           w.tools, [&](const auto &t) { return t->set == o.rigid && !t->motion.coupled(); });
   };
   return !step.driven.empty() || std::ranges::any_of(w.obstacles, [&](const auto &o) {
     return step.obstacle_views[o->slot].moves() && prescribed(*o);

@@ -520,13 +520,13 @@ bool ToolTouch::follows_arcs(const World &w, StepContext &step) const {
   return false;
 }
 
-// Rows without a response take no part in the solve, and one without a solution ends at its budget. Both leave
-// what closes.
+// Rows without a response take no part in the solve, and one without a solution ends at its budget: both leave
+// things that go on closing. Jaws turn at the end of the sub-step only (turn_jaws).
 bool ToolTouch::jams(const World &w, const StepContext &step) const {
-  const double slow = normal_at_rest(w, h_);
-  return !step.budget.cuts_solves() && has_prescribed_motion(w, step) && std::ranges::any_of(rows_, [&](const Row &row) {
+  if (step.budget.cuts_solves() || !has_prescribed_motion(w, step)) return false;
+  return std::ranges::any_of(rows_, [&, slow = normal_at_rest(w, h_)](const Row &row) {
     const double closes = -dot(row.normal, speed(row));
-    return closes > slow && h_ * closes - row.gap > offset_;
+    return !row.pair->jaw && closes > slow && h_ * closes - row.gap > offset_;
   });
 }
 
