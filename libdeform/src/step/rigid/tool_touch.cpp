@@ -520,8 +520,8 @@ bool ToolTouch::follows_arcs(const World &w, StepContext &step) const {
   return false;
 }
 
-// Rows without a response take no part in the solve, and one without a solution ends at its budget: both leave
-// things that go on closing. Jaws turn at the end of the sub-step only (turn_jaws).
+// Rows without a response take no part in the solve, and one without a solution ends at its budget: both
+// leave things that go on closing. Jaws turn at the end of the sub-step only (turn_jaws).
 bool ToolTouch::jams(const World &w, const StepContext &step) const {
   if (step.budget.cuts_solves() || !has_prescribed_motion(w, step)) return false;
   return std::ranges::any_of(rows_, [&, slow = normal_at_rest(w, h_)](const Row &row) {
