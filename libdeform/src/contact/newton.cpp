@@ -26,11 +26,12 @@ constexpr double kStiffest = 0x1p26;
 // motions of blocks, of contacts.
 double ContactNewton::error() const {
   double most = 0;
-  for (size_t k = 0; k < size_t{3} * points_; ++k) most = std::max(most, std::fabs(inverse_[k] * g_[k]));
-  for (uint32_t k = 0; k < row_.size() && points_ < nodes_; ++k) {
+  for (size_t k = 0; k < size_t{3} * first_motion_; ++k)
+    most = std::max(most, std::fabs(inverse_[k] * g_[k]));
+  for (uint32_t k = 0; k < row_.size() && first_motion_ < nodes_; ++k) {
     Vec3 u;
     for (uint32_t e = entry_[k]; e < entry_[k + 1]; ++e)
-      if (node_[e] >= points_) u += entry_times(e, &g_[3 * size_t{node_[e]}]);
+      if (node_[e] >= first_motion_) u += entry_times(e, &g_[3 * size_t{node_[e]}]);
     most = std::max(most, norm(u));
   }
   for (const Body &b : bodies_) {
@@ -43,23 +44,23 @@ double ContactNewton::error() const {
   return most;
 }
 
-double ContactNewton::size() const {
+double ContactNewton::scaled_norm() const {
   double sum = 0;
   for (size_t k = 0; k < g_.size(); ++k) sum += inverse_[k] * (g_[k] * g_[k]);
   return std::sqrt(sum);
 }
 
-// v = base + share way
+// v = base + share direction
 void ContactNewton::move(double share) {
   for (uint32_t k = 0; k < nodes_; ++k)
     for (size_t c = 0; c < 3; ++c)
-      v_[size_t{kStride} * k + c] = base_[size_t{kStride} * k + c] + share * way_[3 * size_t{k} + c];
+      v_[size_t{kStride} * k + c] = base_[size_t{kStride} * k + c] + share * direction_[3 * size_t{k} + c];
 }
 
 // out = A in, of the points of bodies.
 void ContactNewton::multiply_bodies(const double *in, double *out) const {
   std::fill_n(out, size_t{3} * nodes_, 0.0);
-  for (const uint32_t b : at_) {
+  for (const uint32_t b : body_blocks_) {
     const uint32_t i = pattern_.ij[2 * size_t{b}], j = pattern_.ij[2 * size_t{b} + 1];
     const double *const a = &matrix_[9 * size_t{b}];
     add3(out + 3 * size_t{i}, in_frame(a, load3(in + 3 * size_t{j})));
@@ -70,9 +71,9 @@ void ContactNewton::multiply_bodies(const double *in, double *out) const {
 // out = (A + J' G J) in
 void ContactNewton::multiply(const double *in, double *out, bool symmetric) const {
   multiply_bodies(in, out);
-  for (uint32_t k = single_; k < nodes_; ++k)
+  for (uint32_t k = first_single_; k < nodes_; ++k)
     for (size_t c = 0; c < 3; ++c)
-      out[3 * size_t{k} + c] = matrix_[9 * size_t{own_[k]} + 4 * c] * in[3 * size_t{k} + c];
+      out[3 * size_t{k} + c] = matrix_[9 * size_t{diagonal_[k]} + 4 * c] * in[3 * size_t{k} + c];
   for (uint32_t k = 0; k < row_.size(); ++k) {
     if (is_open(k)) continue;  // most rows are
     const double *G = &slope_[9 * size_t{k}];
@@ -86,13 +87,13 @@ void ContactNewton::multiply(const double *in, double *out, bool symmetric) cons
   }
 }
 
-// way = -(A + J'GJ)^-1 g to this relative residual, with the last factor while it is good enough. What
+// direction = -(A + J'GJ)^-1 g to this relative residual, with the last factor while it is good enough. What
 // conjugate gradients need of a matrix costs as much as some of their iterations, and is new each time.
-bool ContactNewton::find_way(bool symmetric, double tolerance) {
+bool ContactNewton::find_direction(bool symmetric, double tolerance) {
   find_slopes(symmetric);
   if (!(current_ || set_matrix())) return false;
   current_ = true;
-  for (size_t k = 0; k < g_.size(); ++k) minus_[k] = inverse_[k] > 0 ? -g_[k] : 0;
+  for (size_t k = 0; k < g_.size(); ++k) rhs_[k] = inverse_[k] > 0 ? -g_[k] : 0;
   const auto by = [&](const double *in, double *out) { multiply(in, out, symmetric); };
   bool definite = true;
   const auto precondition = [&](const double *in, double *out) {
@@ -103,12 +104,12 @@ bool ContactNewton::find_way(bool symmetric, double tolerance) {
     products_ += info.iterations;  // each costs as much as one of those outside
   };
   for (bool fresh : {false, true}) {
-    if (!fresh && (!factored_ || !solver_->direct() || kept_for_ >= Set::inner)) continue;
+    if (!fresh && (!factored_ || !solver_->direct() || factor_products_ >= Set::inner)) continue;
     if (fresh && !refactor()) return false;
-    const Gmres::Result found = gmres_.run(g_.size(), minus_.data(), way_.data(), tolerance, Set::inner,
+    const Gmres::Result found = gmres_.run(g_.size(), rhs_.data(), direction_.data(), tolerance, Set::inner,
                                            solver_->direct(), by, precondition);
     products_ += found.iterations;
-    kept_for_ = fresh ? 0 : kept_for_ + found.iterations;
+    factor_products_ = fresh ? 0 : factor_products_ + found.iterations;
     if (fresh || found.left <= tolerance) break;
   }
   return definite;
@@ -123,32 +124,32 @@ void ContactNewton::begin_step() {
 // Whether r has changed from base to v as A says, to the accuracy of a step's system. A new A would then give
 // no better step, and models take longer for it than the other parts of a step together.
 bool ContactNewton::is_linear() {
-  const size_t n = size_t{3} * single_;
+  const size_t n = size_t{3} * first_single_;
   for (size_t k = 0; k < n; ++k) {
     const size_t at = kStride * (k / 3) + k % 3;
-    way_[k] = v_[at] - base_[at];
+    direction_[k] = v_[at] - base_[at];
   }
-  multiply_bodies(way_.data(), minus_.data());
+  multiply_bodies(direction_.data(), rhs_.data());
   double off = 0, all = 0;
   for (size_t k = 0; k < n; ++k) {
-    const double e = r_[k] - base_r_[k] - minus_[k];
+    const double e = r_[k] - base_r_[k] - rhs_[k];
     off += inverse_[k] * (e * e);
-    all += inverse_[k] * (minus_[k] * minus_[k]);
+    all += inverse_[k] * (rhs_[k] * rhs_[k]);
   }
   return off <= Set::of_start * Set::of_start * all;
 }
 
 // A step with the coupled derivative. False: it does not lower g enough; v is where it was.
 bool ContactNewton::coupled_step(double tolerance, double left, bool &failed) {
-  const double before = size();
+  const double before = scaled_norm();
   const bool kept = current_;
-  failed = !find_way(false, std::min(Set::accuracy * tolerance / left, Set::of_start));
+  failed = !find_direction(false, std::min(Set::accuracy * tolerance / left, Set::of_start));
   if (failed) return false;
   begin_step();
   ++steps_;
   for (const double share : {1.0, 0.5}) {
     move(share);
-    if (!evaluate(false) || !(size() <= (1 - Set::accuracy * share) * before)) continue;
+    if (!evaluate(false) || !(scaled_norm() <= (1 - Set::accuracy * share) * before)) continue;
     current_ = is_linear();
     return true;
   }
@@ -163,15 +164,15 @@ bool ContactNewton::coupled_step(double tolerance, double left, bool &failed) {
 bool ContactNewton::frozen_steps() {
   freeze();
   if (!evaluate(true)) return false;
-  const double start = size();
+  const double start = scaled_norm();
   while (steps_ < limit_) {
     const auto slope = [&] {
       double sum = 0;
-      for (size_t k = 0; k < g_.size(); ++k) sum += g_[k] * way_[k];
+      for (size_t k = 0; k < g_.size(); ++k) sum += g_[k] * direction_[k];
       return sum;
     };
     const bool kept = current_;
-    if (!find_way(true, Set::of_start)) return false;
+    if (!find_direction(true, Set::of_start)) return false;
     const double first = slope();
     begin_step();
     ++steps_;
@@ -179,8 +180,8 @@ bool ContactNewton::frozen_steps() {
       current_ = !kept;
       return evaluate(false);
     }
-    // the share of the way at which the slope has nearly gone, between one where it is negative and one where
-    // it is not, or where the function is not known
+    // the share of the direction at which the slope has nearly vanished, between one where it is negative and
+    // one where it is not, or where the function is not known
     double low = 0, high = 0, at_low = first, at_high = 0, share = 1;
     bool found = false;
     for (uint32_t trial = 0; trial < Set::inner; ++trial) {
@@ -200,9 +201,9 @@ bool ContactNewton::frozen_steps() {
       share =
           low + std::clamp(trial % Set::rounds == Set::rounds - 1 ? 0.5 : ratio, 0.05, 0.95) * (high - low);
     }
-    current_ = known_ && is_linear();
+    current_ = r_known_ && is_linear();
     // no such place: there is a jump in a law, at which steps would stay
-    if (!found || !(size() > Set::accuracy * start)) break;
+    if (!found || !(scaled_norm() > Set::accuracy * start)) break;
   }
   return evaluate(false);
 }
@@ -211,11 +212,11 @@ void ContactNewton::report() {
   host_->spend(uint64_t{products_ - std::exchange(reported_, products_)} * part_.all());
 }
 
-// v with g = 0 for the present multipliers, up to a tolerance in m/s; left: the error. round: coupled and
+// v with g = 0 for the present multipliers, up to a tolerance in m/s; left: the error. cycles: coupled and
 // frozen steps undo each other. With strong friction g may have no zero that they reach; it has one where rho
 // is small, since A then outweighs what is not symmetric.
-bool ContactNewton::newton(double tolerance, double &left, bool &round) {
-  round = false;
+bool ContactNewton::newton(double tolerance, double &left, bool &cycles) {
+  cycles = false;
   goal_ = tolerance;
   if (!evaluate(false)) return false;
   uint32_t phases = 0;
@@ -223,7 +224,7 @@ bool ContactNewton::newton(double tolerance, double &left, bool &round) {
     report();
     bool failed = false;
     if (coupled_step(tolerance, left, failed)) continue;
-    if (!failed && phases++ == Set::rounds) return round = true;
+    if (!failed && phases++ == Set::rounds) return cycles = true;
     if (failed || !frozen_steps()) return false;
   }
   return true;
@@ -250,7 +251,7 @@ void ContactNewton::scale_penalties(double by) {
 }
 
 bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
-  found_ = known_ = current_ = false;
+  converged_ = r_known_ = current_ = false;
   limit_ = steps_ + steps;
   set_penalties(Set::penalty);
   goal_ = Set::accuracy * tolerance;
@@ -259,19 +260,18 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
   double left = std::max(residual_.speed, error()), reference = left;  // m/s
   double best = std::numeric_limits<double>::infinity();
   bool spent = false;
-  uint32_t slow = 0, stood = 0;
-  Array<double> &before = kept_;
+  uint32_t slow = 0, passes_at_rest = 0;
   for (passes_ = 0; passes_ < steps;) {
     ++passes_;
-    before.assign(v_.begin(), v_.end());
+    before_.assign(v_.begin(), v_.end());
     const double goal = Set::accuracy * std::max(reference, tolerance);
     double off;
-    bool round;
-    if (!newton(goal, off, round)) return false;
-    if (round && steps_ < limit_ && host_->goes_on()) {
+    bool cycles;
+    if (!newton(goal, off, cycles)) return false;
+    if (cycles && steps_ < limit_ && host_->goes_on()) {
       scale_penalties(1 / Set::penalty);
       slow = 0;
-      v_.assign(before.begin(), before.end());
+      v_.assign(before_.begin(), before_.end());
       current_ = false;
       continue;
     }
@@ -281,7 +281,7 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
       if (r.kind == Kind::drag) limit_drag(*rows_, r.row);
     if (!host_->judge(residual_)) return false;
     const double required = std::max(residual_.relative, off / tolerance);
-    found_ = required <= Set::accuracy;
+    converged_ = required <= Set::accuracy;
     const double now = std::max(residual_.speed, off);
     if (now < best) {
       best = now;
@@ -292,18 +292,18 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
       for (const Row &r : row_) best_slides_.push_back(r.kind == Kind::contact && state_->slides[r.row]);
     }
     report();
-    if (found_ || steps_ >= limit_ || (spent = !host_->goes_on())) break;
+    if (converged_ || steps_ >= limit_ || (spent = !host_->goes_on())) break;
     lh_.assign(l_.begin(), l_.end());
     double moved = 0;
-    for (size_t k = 0; k < v_.size(); ++k) moved = std::max(moved, std::fabs(v_[k] - before[k]));
+    for (size_t k = 0; k < v_.size(); ++k) moved = std::max(moved, std::fabs(v_[k] - before_[k]));
     // Rows that contradict each other: multipliers change without end, velocities do not, however large the
     // penalties are. Those of nearly parallel rows change slowly, too.
-    const bool still = passes_ > Set::rounds && moved <= Set::accuracy * tolerance;
-    const bool stalled = still && residual_.speed <= Set::contradiction * normal;
-    if (still && off <= tolerance) {
-      const bool stiffest = stiff_ >= kStiffest, repeated = stood++ >= Set::rounds;
-      found_ = stalled && (repeated || stiffest);
-      if (found_ || stiffest) break;
+    const bool at_rest = passes_ > Set::rounds && moved <= Set::accuracy * tolerance;
+    const bool stalled = at_rest && residual_.speed <= Set::contradiction * normal;
+    if (at_rest && off <= tolerance) {
+      const bool stiffest = stiff_ >= kStiffest, repeated = passes_at_rest++ >= Set::rounds;
+      converged_ = stalled && (repeated || stiffest);
+      if (converged_ || stiffest) break;
       scale_penalties(Set::penalty);
     }
     reference = stalled ? off : now;
@@ -313,7 +313,7 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
     slow = 0;
     scale_penalties(Set::penalty);
   }
-  if (!found_ && std::max(residual_.speed, error()) > best) {
+  if (!converged_ && std::max(residual_.speed, error()) > best) {
     v_.swap(best_v_);
     g_.swap(best_g_);
     l_.swap(best_l_);
@@ -322,14 +322,14 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
       if (row_[k].kind == Kind::contact) state_->slides[row_[k].row] = best_slides_[k];
     if (!host_->judge(residual_)) return false;
   }
-  if (found_ && residual_.required > 1) residual_.required = residual_.relative = 1;
+  if (converged_ && residual_.required > 1) residual_.required = residual_.relative = 1;
   // what is left of g moves implicit bodies without a cause; single points have what their impulses give
-  const bool makes_energy = spent ? !bodies_.empty() : gains(normal);
-  return found_ || residual_.required <= 1 || !makes_energy || penalties_alone(tolerance, steps);
+  const bool makes_energy = spent ? !bodies_.empty() : adds_energy(normal);
+  return converged_ || residual_.required <= 1 || !makes_energy || penalties_alone(tolerance, steps);
 }
 
 // Whether normal impulses do more work than residuals of this size explain.
-bool ContactNewton::gains(double normal) const {
+bool ContactNewton::adds_energy(double normal) const {
   double work = 0, all = 0;
   for (uint32_t k = 0; k < row_.size(); ++k) {
     if (row_[k].kind != Kind::contact) continue;
@@ -348,14 +348,14 @@ bool ContactNewton::gains(double normal) const {
 // function that steps lower has their energy at the start of the sub-step as its first value.
 bool ContactNewton::penalties_alone(double tolerance, uint32_t steps) {
   std::fill(lh_.begin(), lh_.end(), 0.0);
-  for (size_t k = 0; k < size_t{3} * single_; ++k)
+  for (size_t k = 0; k < size_t{3} * first_single_; ++k)
     if (inverse_[k] > 0) v_[kStride * (k / 3) + k % 3] = 0;
   current_ = false;
   limit_ = steps_ + steps;
   double left;
-  for (bool round = true; round && steps_ < limit_;) {
-    if (!newton(tolerance, left, round)) return false;
-    if (round) scale_penalties(1 / Set::penalty);
+  for (bool cycles = true; cycles && steps_ < limit_;) {
+    if (!newton(tolerance, left, cycles)) return false;
+    if (cycles) scale_penalties(1 / Set::penalty);
   }
   put_rows();
   find_slides();

@@ -74,7 +74,7 @@ class ContactNewton {
   struct Body {
     ImplicitSystem *system;
     uint32_t source, first, count;  // nodes
-    size_t pattern;                 // first block in at_
+    size_t pattern;                 // first block in body_blocks_
   };
   enum class Kind : uint8_t { contact, bond, drag };
   struct Row {
@@ -88,40 +88,45 @@ class ContactNewton {
   double h_ = 0;
 
   std::vector<Body> bodies_;
-  // of all; the first that is a single point, and the first that is a motion of blocks
-  uint32_t nodes_ = 0, single_ = 0, points_ = 0;
+  // Nodes: points of implicit bodies, then single points, then motions of blocks.
+  uint32_t nodes_ = 0, first_single_ = 0, first_motion_ = 0;
   Array<uint32_t> node_of_dof_;  // kNone: a block
   Array<uint32_t> dof_of_node_;  // of single points; kNone
   ContactRows::Motions motions_;
   Array<Row> row_;
-  Array<uint32_t> entry_;  // [row_+1] into node_, jac_
-  Array<uint32_t> node_;
-  Array<double> jac_;    // [entries,9] rows: the contact's axes
-  Array<double> seen_;   // the same of what velocities see where that differs (ContactRows::arc); else empty
-  Array<double> bias_;   // [row_,3] m/s
-  Array<double> heavy_;  // [points,4] kg, of single points; zero where held
-  // present state
-  Array<double> v_, base_;                  // [nodes,4]
-  Array<double> g_, kept_, way_, minus_;    // [nodes,3]
-  Array<double> inverse_;                   // [nodes,3] of A's diagonal; zero where held
-  Array<double> u_, l_, lh_;                // [row_,3]
-  Array<double> best_v_, best_g_, best_l_;  // of the pass that leaves least
-  Array<uint8_t> best_slides_;              // [row_]
-  Array<double> rho_;                       // [row_,2]
-  Array<double> response_;                  // [rows] 1/rho_t, by row
-  Array<double> slope_;                     // [row_,9] G, row-major
-  Array<double> frozen_;             // [row_] limit of friction, N s, or the normal impulse of a smooth law
-  Array<double> r_, base_r_, of_v_;  // r of bodies, and at base_; the velocities that r_ is of
-  bool known_ = false;               // r_ is of some
-  // matrix
+  Array<uint32_t> entry_;    // [row_+1] into node_, jac_
+  Array<uint32_t> node_;     // [entries]
+  Array<double> jac_;        // [entries,9] rows: the contact's axes
+  Array<double> speed_jac_;  // the same for velocities, where that differs (ContactRows::arc); else empty
+  Array<double> bias_;       // [row_,3] m/s
+  Array<double> mass_;       // [nodes,4] kg of single points; zero where held
+  // the iterate
+  Array<double> v_, base_;    // [nodes,4] m/s: now, and where the step began
+  Array<double> g_;           // [nodes,3] N s
+  Array<double> direction_;   // [nodes,3] m/s, of the step
+  Array<double> rhs_;         // [nodes,3] N s, -g_ where not held; scratch
+  Array<double> inverse_;     // [nodes,3] 1/kg of A's diagonal; zero where held
+  Array<double> u_, l_, lh_;  // [row_,3] m/s, N s
+  Array<double> before_;      // [nodes,4] m/s, v_ at the start of the pass
+  Array<double> rho_;         // [row_,2] kg, normal and tangential
+  Array<double> response_;    // [rows] 1/rho_t, by row
+  Array<double> slope_;       // [row_,9] G, row-major
+  Array<double> frozen_;      // [row_] limit of friction, N s, or the normal impulse of a smooth law
+  // r of bodies at r_velocities_, if r_known_; at base_
+  Array<double> r_, r_velocities_, base_r_;
+  bool r_known_ = false;
+  // of the pass that leaves the least residual
+  Array<double> best_v_, best_g_, best_l_;
+  Array<uint8_t> best_slides_;  // [row_]
+  // the matrix
   BlockPattern pattern_;
   Array<uint32_t> pairs_, begin_, by_lower_, number_, higher_;  // of shape()
   Array<uint32_t> ij_;                                          // [nb,2] the blocks of the matrix
-  Array<uint32_t> analysed_;                                    // ij_ of the order that factor_ has
-  Array<uint32_t> place_;                                       // the block of each pair, of which are
-  std::span<const uint32_t> at_;                                // those of the bodies' patterns
-  std::span<const uint32_t> own_;                               // [nodes] the diagonal
-  Array<uint32_t> row_of_, begin_entry_, entry_by_node_;        // of entries
+  Array<uint32_t> analysed_;                                    // ij_ that factor_ has the order of
+  Array<uint32_t> place_;                                       // the block of each pair: first
+  std::span<const uint32_t> body_blocks_;                       // those of the bodies' patterns, then
+  std::span<const uint32_t> diagonal_;                          // [nodes] the diagonal
+  Array<uint32_t> row_of_, begin_entry_, entry_by_node_;        // [entries], [nodes+1], [entries]
   Array<double> stiff_jac_;                                     // [entries,9] S J, S = sym(G)
   Array<double> places_;                                        // [nodes,3] m
   Array<double> blocks_, matrix_;                               // [nb,9] A + J' sym(G) J; A
@@ -132,14 +137,14 @@ class ContactNewton {
   bool current_ = false;  // A is that at v, to the accuracy of a step's system
   Gmres gmres_;
 
-  bool found_ = false;
+  bool converged_ = false;
   Residual residual_;
   uint32_t passes_ = 0, steps_ = 0, products_ = 0, factors_ = 0;
-  double goal_ = 0;        // m/s, of g in the present pass
-  double stiff_ = 0;       // rho w
-  uint32_t limit_ = 0;     // on steps_
-  uint32_t kept_for_ = 0;  // products with the present factor since the system that it is of
-  uint32_t reported_ = 0;  // of products_, to the host
+  double goal_ = 0;               // m/s, of g in the present pass
+  double stiff_ = 0;              // rho w
+  uint32_t limit_ = 0;            // on steps_
+  uint32_t factor_products_ = 0;  // since factor_ was made
+  uint32_t reported_ = 0;         // of products_, to the host
 
   void number_nodes(std::span<ImplicitSystem *const> systems);
   void list_rows();
@@ -172,19 +177,19 @@ class ContactNewton {
   bool set_matrix();
   bool refactor();
   static void symmetric_part(const double *G, double *out);
-  bool find_way(bool symmetric, double tolerance);
+  bool find_direction(bool symmetric, double tolerance);
   void begin_step();
   bool is_linear();
   void multiply_bodies(const double *in, double *out) const;
   void multiply(const double *in, double *out, bool symmetric) const;
   void move(double share);
-  double error() const;  // m/s, largest of inverse g
-  double size() const;   // of g, in the metric of the inverse diagonal
-  bool newton(double tolerance, double &left, bool &round);
+  double error() const;        // m/s, largest of inverse g
+  double scaled_norm() const;  // of g, in the metric of the inverse diagonal
+  bool newton(double tolerance, double &left, bool &cycles);
   void scale_penalties(double by);
   bool coupled_step(double tolerance, double left, bool &failed);
   bool frozen_steps();
-  bool gains(double normal) const;
+  bool adds_energy(double normal) const;
   bool penalties_alone(double tolerance, uint32_t steps);
   void put_rows();
   void report();  // the products, to the host

@@ -17,10 +17,11 @@ constexpr uint32_t kIterated = 1000;
 }  // namespace
 
 ContactNewton::ContactNewton(const Memory &m, Tasks *tasks) : factor_(m), levels_(m, tasks), gmres_(m) {
-  use_memory(m, node_of_dof_, dof_of_node_, row_, entry_, node_, jac_, seen_, bias_, heavy_, v_, base_, g_,
-             kept_, way_, minus_, inverse_, u_, l_, lh_, best_v_, best_g_, best_l_, rho_, response_, slope_,
-             frozen_, pairs_, begin_, by_lower_, number_, higher_, ij_, place_, blocks_, matrix_, places_,
-             analysed_, best_slides_, r_, base_r_, of_v_, row_of_, begin_entry_, entry_by_node_, stiff_jac_);
+  use_memory(m, node_of_dof_, dof_of_node_, row_, entry_, node_, jac_, speed_jac_, bias_, mass_, v_, base_,
+             g_, before_, direction_, rhs_, inverse_, u_, l_, lh_, best_v_, best_g_, best_l_, rho_, response_,
+             slope_, frozen_, pairs_, begin_, by_lower_, number_, higher_, ij_, place_, blocks_, matrix_,
+             places_, analysed_, best_slides_, r_, base_r_, r_velocities_, row_of_, begin_entry_,
+             entry_by_node_, stiff_jac_);
   use_memory(m, motions_.g, motions_.s, motions_.touched, motions_.columns, motions_.left,
              motions_.first_column, motions_.column_count, motions_.first_value);
 }
@@ -32,14 +33,14 @@ void ContactNewton::begin(ContactRows &rows, const RowsPart &part, std::span<Imp
   state_ = &state;
   host_ = &host;
   h_ = h;
-  found_ = factored_ = shaped_ = false;
+  converged_ = factored_ = shaped_ = false;
   passes_ = steps_ = products_ = factors_ = reported_ = 0;
   number_nodes(systems);
   list_rows();
   set_bias();
-  for (Array<double> *a : {&g_, &kept_, &way_, &minus_}) a->resize(size_t{3} * nodes_);
+  for (Array<double> *a : {&g_, &direction_, &rhs_}) a->resize(size_t{3} * nodes_);
   base_.resize(v_.size());
-  r_.resize(size_t{3} * single_);
+  r_.resize(size_t{3} * first_single_);
   const size_t n = row_.size();
   u_.resize(3 * n);
   l_.resize(3 * n);
@@ -56,7 +57,7 @@ void ContactNewton::number_nodes(std::span<ImplicitSystem *const> systems) {
   const ContactRows &rows = *rows_;
   bodies_.clear();
   dof_of_node_.clear();
-  heavy_.clear();
+  mass_.clear();
   node_of_dof_.resize(rows.ndof);
   nodes_ = 0;
   const auto each_dof = [&](auto &&f) {
@@ -85,9 +86,9 @@ void ContactNewton::number_nodes(std::span<ImplicitSystem *const> systems) {
     for (uint32_t k = 0; k < b.count; ++k)
       inverse_.insert(inverse_.end(), diagonal + kStride * k, diagonal + kStride * k + 3);
   }
-  single_ = nodes_;
+  first_single_ = nodes_;
   dof_of_node_.assign(nodes_, kNone);
-  heavy_.assign(size_t{kStride} * nodes_, 0.0);
+  mass_.assign(size_t{kStride} * nodes_, 0.0);
   each_dof([&](uint32_t d) {
     if (rows.block[d] != kNone || node_of_dof_[d] != kNone) return;
     if (systems[rows.source[d]]) {
@@ -99,23 +100,23 @@ void ContactNewton::number_nodes(std::span<ImplicitSystem *const> systems) {
     node_of_dof_[d] = nodes_++;
     dof_of_node_.push_back(d);
     for (size_t c = 0; c < kStride; ++c) {
-      const double alone = c < 3 ? rows.alone[size_t{kStride} * d + c] : 0;
+      const double inverse = c < 3 ? rows.inverse_mass[size_t{kStride} * d + c] : 0;
       v_.push_back(c < 3 ? rows.y[size_t{kStride} * d + c] : 0);
-      heavy_.push_back(alone > 0 ? 1 / alone : 0);
-      if (c < 3) inverse_.push_back(alone);
+      mass_.push_back(inverse > 0 ? 1 / inverse : 0);
+      if (c < 3) inverse_.push_back(inverse);
     }
   });
-  points_ = nodes_;
+  first_motion_ = nodes_;
   // blocks: their motions, from where the impulses of the start have brought them
   motions_.rank = 0;
   motions_.touched.clear();
   if (!part_.blocks.empty()) rows.motions(part_.blocks, motions_);
   nodes_ += (motions_.rank + 2) / 3;
   v_.resize(size_t{kStride} * nodes_, 0.0);
-  heavy_.resize(size_t{kStride} * nodes_, 0.0);
+  mass_.resize(size_t{kStride} * nodes_, 0.0);
   inverse_.resize(size_t{3} * nodes_, 1.0);
   dof_of_node_.resize(nodes_, kNone);
-  if (single_ >= kIterated) solver_ = &levels_;
+  if (first_single_ >= kIterated) solver_ = &levels_;
   else solver_ = &factor_;
   // single points and motions have no place: a patch turns them about a wrong one, which costs iterations
   places_.assign(size_t{3} * nodes_, 0.0);
@@ -130,7 +131,7 @@ void ContactNewton::list_rows() {
   entry_.assign(1, 0);
   node_.clear();
   jac_.clear();
-  seen_.clear();
+  speed_jac_.clear();
   const bool turns = motions_.rank > 0 && !motions_.s.empty();
   const auto add = [&](uint32_t i, Kind kind) {
     row_.push_back({i, kind});
@@ -142,15 +143,16 @@ void ContactNewton::list_rows() {
       for (size_t r = 0; r < 3; ++r)
         for (size_t c = 0; c < 3; ++c)
           jac_.push_back(inverse_[3 * size_t{node} + c] > 0 ? rows.weight[j] * f[3 * r + c] : 0);
-      if (turns) seen_.insert(seen_.end(), jac_.end() - 9, jac_.end());
+      if (turns) speed_jac_.insert(speed_jac_.end(), jac_.end() - 9, jac_.end());
     }
     if (motions_.rank > 0) rows.motion_row(i, motions_);
     for (const uint32_t q : motions_.touched) {
       const double *const of = &motions_.g[size_t{9} * q];
       if (std::all_of(of, of + 9, [](double x) { return x == 0; })) continue;
-      node_.push_back(points_ + q);
+      node_.push_back(first_motion_ + q);
       jac_.insert(jac_.end(), of, of + 9);
-      if (turns) seen_.insert(seen_.end(), &motions_.s[size_t{9} * q], &motions_.s[size_t{9} * q] + 9);
+      if (turns)
+        speed_jac_.insert(speed_jac_.end(), &motions_.s[size_t{9} * q], &motions_.s[size_t{9} * q] + 9);
     }
     entry_.push_back(static_cast<uint32_t>(node_.size()));
   };
@@ -184,7 +186,7 @@ void ContactNewton::set_bias() {
     store3(&bias_[3 * k], u);
     // motions of blocks as the start impulses have made them
     for (uint32_t e = entry_[k]; e < entry_[k + 1]; ++e) {
-      if (node_[e] < points_) continue;
+      if (node_[e] < first_motion_) continue;
       const Vec3 l = load3(&rows.impulse[size_t{3} * i]);
       add3(&v_[size_t{kStride} * node_[e]], from_frame(&jac_[size_t{9} * e], l));
     }
@@ -217,7 +219,7 @@ void ContactNewton::set_penalties(double factor) {
 }
 
 Vec3 ContactNewton::entry_times(uint32_t e, const double *x) const {
-  return in_frame(&(seen_.empty() ? jac_ : seen_)[size_t{9} * e], load3(x));
+  return in_frame(&(speed_jac_.empty() ? jac_ : speed_jac_)[size_t{9} * e], load3(x));
 }
 
 Vec3 ContactNewton::times(uint32_t k, const double *x, size_t stride) const {
@@ -247,13 +249,13 @@ void ContactNewton::evaluate_bond(uint32_t k) {
 
 // r of the bodies at v: multipliers and limits change without v, and the forces of models are expensive.
 bool ContactNewton::find_residual() {
-  const auto end = v_.begin() + std::ptrdiff_t(kStride * size_t{single_});
-  if (known_ && std::equal(v_.begin(), end, of_v_.begin())) return true;
-  known_ = false;
+  const auto end = v_.begin() + std::ptrdiff_t(kStride * size_t{first_single_});
+  if (r_known_ && std::equal(v_.begin(), end, r_velocities_.begin())) return true;
+  r_known_ = false;
   for (const Body &b : bodies_)
     if (!b.system->residual(&v_[size_t{kStride} * b.first], &r_[size_t{3} * b.first])) return false;
-  of_v_.assign(v_.begin(), end);
-  return known_ = true;
+  r_velocities_.assign(v_.begin(), end);
+  return r_known_ = true;
 }
 
 // N s, the friction impulse that would end the slip of a contact at the present velocities.
@@ -289,12 +291,12 @@ bool ContactNewton::evaluate(bool frozen) {
   const size_t stride = s.stride;
   if (!find_residual()) return false;
   std::copy(r_.begin(), r_.end(), g_.begin());
-  for (uint32_t k = single_; k < points_; ++k)
+  for (uint32_t k = first_single_; k < first_motion_; ++k)
     for (size_t c = 0; c < 3; ++c)
       g_[3 * size_t{k} + c] =
-          heavy_[size_t{kStride} * k + c] *
+          mass_[size_t{kStride} * k + c] *
           (v_[size_t{kStride} * k + c] - rows_->y_free[size_t{kStride} * dof_of_node_[k] + c]);
-  for (uint32_t k = points_; k < nodes_; ++k)
+  for (uint32_t k = first_motion_; k < nodes_; ++k)
     for (size_t c = 0; c < 3; ++c) g_[3 * size_t{k} + c] = v_[size_t{kStride} * k + c];
   bool laws = false;
   double finite = 0;  // NaN if a velocity is not: no law is asked there
@@ -489,8 +491,8 @@ void ContactNewton::shape() {
     for (const uint32_t j : higher_) number_[j] = kNone;
   }
   pattern_ = {nodes_, static_cast<uint32_t>(ij_.size() / 2), ij_.data()};
-  at_ = {place_.data(), n};
-  own_ = {place_.data() + n, nodes_};
+  body_blocks_ = {place_.data(), n};
+  diagonal_ = {place_.data() + n, nodes_};
   blocks_.resize(size_t{9} * pattern_.nb);
   matrix_.assign(size_t{9} * pattern_.nb, 0.0);
   shaped_ = true;
@@ -499,18 +501,18 @@ void ContactNewton::shape() {
 // A at the present state, and the inverse of its diagonal.
 bool ContactNewton::set_matrix() {
   if (!shaped_) shape();
-  for (const uint32_t b : at_) std::fill_n(&matrix_[9 * size_t{b}], 9, 0.0);
+  for (const uint32_t b : body_blocks_) std::fill_n(&matrix_[9 * size_t{b}], 9, 0.0);
   for (const Body &b : bodies_)
-    if (!b.system->matrix(&at_[b.pattern], matrix_.data())) return false;
-  for (uint32_t k = single_; k < nodes_; ++k)
+    if (!b.system->matrix(&body_blocks_[b.pattern], matrix_.data())) return false;
+  for (uint32_t k = first_single_; k < nodes_; ++k)
     for (size_t c = 0; c < 3; ++c) {
-      const double heavy = heavy_[size_t{kStride} * k + c];
-      matrix_[9 * size_t{own_[k]} + 4 * c] = k < points_ && heavy > 0 ? heavy : 1;
+      const double mass = mass_[size_t{kStride} * k + c];
+      matrix_[9 * size_t{diagonal_[k]} + 4 * c] = k < first_motion_ && mass > 0 ? mass : 1;
     }
-  for (uint32_t k = 0; k < single_; ++k)
+  for (uint32_t k = 0; k < first_single_; ++k)
     for (size_t c = 0; c < 3; ++c) {
       double &inverse = inverse_[3 * size_t{k} + c];
-      if (inverse > 0) inverse = 1 / matrix_[9 * size_t{own_[k]} + 4 * c];
+      if (inverse > 0) inverse = 1 / matrix_[9 * size_t{diagonal_[k]} + 4 * c];
     }
   return true;
 }

@@ -17,10 +17,10 @@ uint32_t source_of_node(std::span<const DofSource> sources, uint32_t node) {
 }  // namespace
 
 ContactRows::ContactRows(const Memory &m) : kernels_(dense_kernels()) {
-  use_memory(m, begin, dof, weight, y, y_free, alone, source, point, block, blocks, response_, unit_response_,
-             frame, drive, rate, borne, start_depth, compliance, wn, wt, cross, impulse, bond, dof_of_point_,
-             dof_of_node_, place_, rigid, arm, rigid_a, arm_a, arc, arc_a, dof_of_group_, every_block_,
-             whole_of);
+  use_memory(m, begin, dof, weight, y, y_free, inverse_mass, source, point, block, blocks, response_,
+             unit_response_, frame, drive, rate, borne, start_depth, compliance, wn, wt, cross, impulse, bond,
+             dof_of_point_, dof_of_node_, place_, rigid, arm, rigid_a, arm_a, arc, arc_a, dof_of_group_,
+             every_block_, whole_of);
 }
 
 // Of the dofs from `first` on.
@@ -209,19 +209,19 @@ void ContactRows::build(std::span<const ContactPoint> contacts, std::span<const 
   }
   begin.push_back(static_cast<uint32_t>(dof.size()));
   y.resize(size_t(ndof) * 4);
-  alone.resize(size_t(ndof) * 4);
+  inverse_mass.resize(size_t(ndof) * 4);
   for (uint32_t d = 0; d < ndof; ++d) {
     // a rigid body's change of velocity: what it has without contact is the contact's own `velocity`
     if (source[d] == kNone) {
       std::fill_n(&y[size_t(d) * 4], 4, 0.0);
-      std::fill_n(&alone[size_t(d) * 4], 4, 0.0);
+      std::fill_n(&inverse_mass[size_t(d) * 4], 4, 0.0);
       continue;
     }
     const DofSource &s = sources[source[d]];
     if (block[d] == kNone) dof_of_point_[s.first_point + point[d]] = kNone;
     for (uint32_t k = 0; k < 4; ++k) {
       y[size_t(d) * 4 + k] = s.velocity[size_t(point[d]) * 4 + k];
-      alone[size_t(d) * 4 + k] = s.diagonal ? s.diagonal[size_t(point[d]) * 4 + k] : 0;
+      inverse_mass[size_t(d) * 4 + k] = s.diagonal ? s.diagonal[size_t(point[d]) * 4 + k] : 0;
     }
   }
   points_free_ = true;

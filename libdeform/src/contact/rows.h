@@ -71,7 +71,7 @@ struct ContactRows {
   Array<uint32_t> dof;
   Array<double> weight;
   // [ndof,4]; 1/kg, the diagonal response of a dof, zero for those of blocks
-  Array<double> y, alone;
+  Array<double> y, inverse_mass;
   Array<double> y_free;  // [ndof,4] without impulses
   // [ndof] index of the DofSource (rigid: kNone), phyxel (or surfel of a block)
   Array<uint32_t> source, point;
@@ -231,7 +231,7 @@ struct ContactRows {
   void set_arms(std::span<const ContactPoint> contacts, std::span<const DofSource> sources,
                 const RigidPlaces &rigids, std::span<const Bond> bonds);
   Vec3 response_alone(uint32_t d, Vec3 p) const {  // of a dof that is in no block
-    const double *const w = &alone[size_t(d) * 4];
+    const double *const w = &inverse_mass[size_t(d) * 4];
     return {w[0] * p.x, w[1] * p.y, w[2] * p.z};
   }
   void response_apply(const Block &b, uint32_t k, Vec3 p);
