@@ -138,7 +138,7 @@ Adapter::Object *Adapter::known(const btCollisionObject *object, int place) cons
   return at == by_id_.end() ? nullptr : at->second;
 }
 
-// Of an object whose shapes are not known.
+// Refuses an object whose shapes are not known.
 dfm_status Adapter::check(const btCollisionObject *object) const {
   std::vector<Part> parts;
   const btCollisionShape *unknown = nullptr;

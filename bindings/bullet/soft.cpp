@@ -37,7 +37,7 @@ Arrays arrays_of(const btSoftBody &body) {
   return a;
 }
 
-// Of the cell that holds a place: the one in which its least barycentric coordinate is largest.
+// The corners of the cell that holds a place: the one in which its least barycentric coordinate is largest.
 std::array<uint32_t, 4> corners_around(const dfm_mesh_info &mesh, Vec place) {
   const uint32_t *best = mesh.tets;
   double deepest = -HUGE_VAL;

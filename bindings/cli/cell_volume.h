@@ -4,7 +4,7 @@
 
 namespace cli {
 
-// Of a tetrahedron whose corners are these points, m3; negative where it is turned inside out.
+// The volume of a tetrahedron with these corners, m3; negative where it is inverted.
 inline double cell_volume(const double *points, const uint32_t *tet) {
   double e[3][3];
   for (size_t k = 0; k < 3; ++k)

@@ -54,7 +54,7 @@ class Drawing {
     std::optional<SurfaceStress> stress;
     bool colored = false;
   };
-  // Of a body as it is now; displacements count from here.
+  // Fills the buffers with a body as it is now; displacements count from here.
   static void make(const BodyView &body, Buffers &b);
   bool fill_values(const BodyView &body, Buffers &b);
   float noise() const;

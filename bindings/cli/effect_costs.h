@@ -22,7 +22,7 @@ struct EffectCost {
   bool clear() const { return low > 0 || high < 0; }  // of the noise
 };
 
-// Of every effect that is at work and that a parameter switches off; plan: what scene.explain() says.
+// Measures every effect that is at work and that a parameter switches off; plan: what scene.explain() says.
 using MeasureEffects = std::vector<EffectCost>(Globals &globals, SceneFile &scene,
                                                const std::vector<std::string> &set, const JsonValue &plan);
 MeasureEffects measure_effects;  // of deform-cost

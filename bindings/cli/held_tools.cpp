@@ -31,7 +31,7 @@ void turn_between(const double from[4], const double to[4], double out[3]) {
   for (int k = 0; k < 3; ++k) out[k] = s > 0 ? sign * angle * q[k] / s : 0;
 }
 
-// Of a way, in a step of h at that speed at most.
+// The share of a path that is covered in a step of h at that speed at most.
 double share_of(double way, double speed, double h) { return way > speed * h ? speed * h / way : 1; }
 
 }  // namespace

@@ -86,7 +86,7 @@ void end(Sentence &s) {
 #endif
 }
 
-// Of exit, quick_exit and _exit, whatever code they were given.
+// Handles exit, quick_exit and _exit, whatever code they were given.
 void at_exit_handler() {
   if (!undecided) return;
   undecided = 0;

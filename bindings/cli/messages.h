@@ -58,7 +58,7 @@ class Quiet {
 
 // The context's copies of rows have the size of this header's.
 inline std::span<const dfm_param> params_of(const dfm_type &type) { return {type.params, type.nparam}; }
-// Of a type of a plugin: "law", "model", "solver".
+// The word for a type of a plugin: "law", "model", "solver".
 const char *kind_name(uint32_t kind);
 // The valid name nearest to a wrong one, for "did you mean"; empty when nothing is near.
 std::string nearest(const std::string &word, const std::vector<std::string> &valid);

@@ -396,7 +396,7 @@ std::string joules(double energy) {
   return text;
 }
 
-// Of a body that has shattered most pieces are of a few cells, and each is a body.
+// Most pieces of a shattered body are of a few cells, and each is a body: they are counted, not listed.
 void print_shattered(const SceneFile &scene) {
   constexpr size_t kMany = 64;
   std::map<dfm_body, size_t> parts;  // by the body that the scene has made

@@ -17,7 +17,7 @@
 
 namespace cli {
 
-// Of numbers in headers, which are big-endian.
+// Numbers in headers are big-endian.
 inline void put16(unsigned char *to, uint32_t x) {
   to[0] = static_cast<unsigned char>(x >> 8);
   to[1] = static_cast<unsigned char>(x);
@@ -112,7 +112,7 @@ class RtpSender {
   const double begin_;  // s, of the world
   const Clock::time_point began_ = Clock::now();
 
-  // Of the thread that steps.
+  // The thread that steps uses these.
   Clock::time_point next_frame_ = began_;
   Teller teller_;
 
@@ -126,7 +126,7 @@ class RtpSender {
   std::vector<std::string> requests_;
   Report report_;
 
-  // Of the thread of the network.
+  // The thread of the network uses these.
   uint16_t sequence_;
   uint32_t source_, first_stamp_;
   uint32_t stamp_ = 0;  // of what is sent now

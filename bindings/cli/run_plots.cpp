@@ -30,7 +30,7 @@ struct Plot {
   std::vector<Curve> curves;
 };
 
-// Of a linear axis: its ends, and steps of 1, 2 or 5 times a power of ten.
+// A linear axis: its ends, and steps of 1, 2 or 5 times a power of ten.
 struct Axis {
   double low, high, from, to, step;  // from, to: pixels
   Axis(double least, double most, double first, double last, int ticks)

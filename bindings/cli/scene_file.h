@@ -59,8 +59,8 @@ class SceneFile {
   const std::vector<RigidView> &rigids() const { return rigids_; }
   const std::string &name_of(uint64_t handle) const;    // of a body or an obstacle
   std::string value(const std::string &pointer) const;  // JSON text; "" where nothing is
-  // Of a body of the file by its name: the world has them in another order where the file gives them ids. Of
-  // others, as pieces, one where nothing is.
+  // The JSON pointer of a body of the file by its name: the world has them in another order where the file
+  // gives them ids. For others, as pieces, a pointer at which nothing is.
   std::string pointer_of(const std::string &body) const;
   std::string explain() const;
 

@@ -10,7 +10,8 @@ namespace cli {
 // Sixteen hexadecimal digits, as in summary.json.
 std::string hash_text(uint64_t hash);
 uint64_t hash_of(const std::string &bytes);  // FNV-1a, 64 bit: against a mistaken file, not against forgery
-// Of the scene with its --set values, but for "output" and "time/duration": a run may go on for longer.
+// A hash of the scene with its --set values, but for "output" and "time/duration": a run may go on for
+// longer.
 uint64_t scene_hash(const SceneFile &scene);
 
 // Throw Failure: the file cannot be written; equilibria have no state to go on from.

@@ -26,7 +26,7 @@ class Grip {
   void take(int tool);  // the one before stays where it is; -1: none
   void next();          // the next one, and after the last none
   void let_go();        // it returns to the motion that the scene has for it
-  // Of the one that is taken.
+  // Whether the tool that is taken has jaws.
   bool jaws() const { return tools_[size_t(taken_)].jaws; }
   double opening() const { return opening_; }  // rad, where it shall go
   render::Vec to() const { return to_; }       // m

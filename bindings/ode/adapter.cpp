@@ -267,7 +267,7 @@ dfm_status Adapter::rigid(dBodyID body, dfm_rigid *out) {
   return DFM_OK;
 }
 
-// Of a geom that was added since the last step, too.
+// Refuses an unknown geom; one that was added since the last step is known, too.
 dfm_status Adapter::must_have(dGeomID geom) {
   seen_.clear();
   engine_.spaces.clear();

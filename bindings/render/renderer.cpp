@@ -606,7 +606,7 @@ void GlRenderer::resolve() {
   gl_.BlitFramebuffer(0, 0, w, h, 0, 0, w, h, GL_COLOR_BUFFER_BIT, GL_NEAREST);
 }
 
-// Of the framebuffer that is bound for reading.
+// Reads the framebuffer that is bound for reading.
 void GlRenderer::read(Image &picture) {
   const GLint w = GLint(width_), h = GLint(height_);
   gl_.PixelStorei(GL_PACK_ALIGNMENT, 4);

@@ -68,7 +68,7 @@ struct Member {
   // Axes along and about which it may move (1) or not (0), in the world's frame.
   Vec moves_along{1, 1, 1}, turns_about{1, 1, 1};
 
-  // Of this sub-step.
+  // In this sub-step.
   Kind kind = still;
   bool turns = false;      // its rotation is computed here
   bool asleep = false;     // the engine has it asleep

@@ -48,7 +48,7 @@ class OwnWorld : public Host {
   virtual void set_gravity(const double gravity[3]) = 0;
   // The share of an overlap or of a joint's error that the engine undoes in the sub-step.
   virtual void set_correction(double share) = 0;
-  // Of the first body against the second, in a sub-step of h.
+  // Drives the first body of a joint against the second, in a sub-step of h.
   virtual void drive(size_t joint, double velocity, double max, double h) = 0;
   virtual Wrench wrench(size_t joint) const = 0;
   // What the engine remembers of earlier sub-steps, behind the values of bodies and joints: how many numbers;

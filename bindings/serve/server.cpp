@@ -29,7 +29,7 @@ std::string header(lws *wsi, lws_token_indexes which) {
 
 }  // namespace
 
-// Of one connection; libwebsockets keeps it in memory that it has zeroed.
+// The state of one connection; libwebsockets keeps it in memory that it has zeroed.
 struct Server::Viewer {
   uint32_t number;
   uint64_t scene, frame, state;  // what it has

@@ -66,7 +66,7 @@ class Server final : public live::Viewers {
   uint16_t port_ = 0;
   lws_context *context_ = nullptr;
   std::thread thread_;
-  // Of the thread of the network: the frame that is packed, and as it goes out.
+  // The thread of the network uses these: the frame that is packed, and as it goes out.
   Bytes packed_;
   Message frame_;
   uint64_t frame_number_ = 0;

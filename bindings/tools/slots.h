@@ -28,7 +28,7 @@ inline std::vector<dfm_slot> slot_rows(const dfm_slot *slots, uint32_t n, uint32
   return out;
 }
 
-// Of what dfm_friction.state or DFM_EXT_SLOTS answered; nothing where it is no such table.
+// The rows of what dfm_friction.state or DFM_EXT_SLOTS answered; nothing where it is no such table.
 inline std::optional<std::vector<dfm_slot>> slot_rows(const dfm_slots *own) {
   constexpr size_t kHead = offsetof(dfm_slots, slots) + sizeof(void *);
   if (!own || own->size < kHead || own->size > 65536) return std::nullopt;

@@ -18,7 +18,7 @@ struct Touch {
   render::Vec point, force;  // m, N
   bool sticks;
 };
-// Of the last sub-step: of two bodies the force on the one that was made first.
+// The contacts of the last sub-step; between two bodies, the force on the one that was made first.
 std::vector<Touch> touches_of(const cli::SceneFile &scene);
 
 class Arrows {

@@ -18,7 +18,7 @@ class Canvas {
   uint32_t width() const { return width_; }  // pixels
   uint32_t height() const { return height_; }
   double aspect() const { return double(width_) / height_; }
-  // Of a pixel, from -1 (left, bottom) to 1.
+  // Where a pixel is, from -1 (left, bottom) to 1.
   double across(double x) const { return 2 * x / width_ - 1; }
   double above(double y) const { return 1 - 2 * y / height_; }
 

@@ -12,7 +12,7 @@ inline constexpr float kWide = 310, kGap = 12;  // pixels, for letters of 14
 inline constexpr ImGuiWindowFlags kFixed = ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoResize |
                                            ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoTitleBar |
                                            ImGuiWindowFlags_AlwaysAutoResize;
-// Of a size that is meant for letters of 14 pixels.
+// Scales a size that is meant for letters of 14 pixels.
 float scaled(float size);
 void begin_panel();  // in the upper left corner; ImGui::End() ends it
 void wrapped(const std::string &text);

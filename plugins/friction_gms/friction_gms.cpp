@@ -46,8 +46,8 @@ constexpr dfm_param kRows[] = {
 };
 constexpr double kUsualK[kUsual] = {4e7, 3e7, 2e7, 1e7}, kUsualNu[kUsual] = {0.2, 0.3, 0.3, 0.2};
 
-// Of n elements: n tangent pairs z_i (m); then n flags, 1 while the element slips, and the budget (J: an area
-// that grows brings none).
+// The state of n elements: n tangent pairs z_i (m); then n flags, 1 while the element slips, and the budget
+// (J: an area that grows brings none).
 constexpr uint32_t flag_of(uint32_t n) { return 2 * n; }
 constexpr uint32_t budget_of(uint32_t n) { return 3 * n; }
 struct Slots {

@@ -211,8 +211,8 @@ class CellBody {
     }
   }
 
-  // Of the mean strain in the frame, turned into the axes of the world; where frames turn,
-  // (s - [q]x) S / det S with the q that makes it symmetric.
+  // The stress of the mean strain in the frame, turned into the axes of the world; where frames turn, (s -
+  // [q]x) S / det S with the q that makes it symmetric.
   void cell_stress(const dfm_kin &k, double *stress) const {
     constexpr int kRow[6] = {0, 1, 2, 0, 1, 2}, kCol[6] = {0, 1, 2, 1, 2, 0};
     const double flow = flow_at(k);

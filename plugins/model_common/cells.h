@@ -18,7 +18,7 @@
 // HEX20, HEX27: serendipity and triquadratic shape functions, 3 x 3 x 3 points. The same projection of the
 // volume change leaves four constraints per cell, against 12 and 24 displacements of a large mesh. It changes
 // nothing where displacements are quadratic and the cell a parallelepiped.
-// Of a hexahedron of a lattice the same integrals are over its material, by 3 x 3 x 3 points whose weights
+// For a hexahedron of a lattice the same integrals are over its material, by 3 x 3 x 3 points whose weights
 // are given (dfm_mesh.inside): in a box they are exact for all functions that occur. The quadratic
 // displacements lose their mean gradient over the material, again for constant stresses, and those that say
 // nothing new on material that is thin in their direction stay zero. A share kTie of the stiffness is that of
@@ -117,7 +117,7 @@ inline void tet10(int n, Point &p) {
   }
 }
 
-// Of the 3 x 3 x 3 points.
+// The sum over the 3 x 3 x 3 points.
 inline double whole_share(int n) {
   constexpr double kShare[3] = {5.0 / 18, 8.0 / 18, 5.0 / 18};
   return kShare[n % 3] * kShare[n / 3 % 3] * kShare[n / 9];

@@ -80,7 +80,7 @@ inline constexpr dfm_effect_row kOff[] = {
 inline constexpr const char *kEffects[] = {"volume",     "damping",           "large_rotation",
                                            "anisotropy", "deform.relaxation", nullptr};
 
-// Of all parameters beside their ranges; false after the reason was logged.
+// Whether all parameters fit together, beside their ranges; false after the reason was logged.
 inline bool fit_together(const dfm_host *h, const char *who, const double *values) {
   if (values[kVolume] < 0 && values[kVolume] != kFromPoisson) {
     model::complain(
@@ -195,7 +195,8 @@ struct Material {
   }
   double volume_ratio(uint32_t c) const { return volume_of(c) / (3 * (1 - 2 * at(kPoisson, c))); }
   double largest_volume() const;
-  // Of spring e with its branch, switched off or not; its damper over that; its rest length as it counts.
+  // The stiffness of spring e with its branch, switched off or not; its damper over that; its rest length as
+  // it counts.
   double full_stiffness(uint32_t e) const { return scale * shape[e]; }
   double stiffness_of(uint32_t e) const { return edge_off.empty() || !edge_off[e] ? scale * shape[e] : 0; }
   double damp_scale() const {

@@ -42,7 +42,7 @@ struct Partition {
   }
 };
 
-// Of block_begin, for partition_points.
+// The capacity of block_begin, for partition_points.
 inline uint32_t partition_capacity(uint32_t npoint) { return 2 * (npoint / kBlockPoints) + 2; }
 
 // Fills order[npoint] and where each block begins in it; returns the number of blocks.

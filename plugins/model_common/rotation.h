@@ -84,7 +84,7 @@ inline bool scaled(const double *f, double *out) {
   return true;
 }
 
-// Of a quaternion w x y z of any length but zero.
+// The rotation of a quaternion w x y z of any length but zero.
 inline void from_quaternion(const double *q, double *r) {
   const double s = 2 / ((q[0] * q[0] + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3]));
   const double x = s * q[1], y = s * q[2], z = s * q[3];

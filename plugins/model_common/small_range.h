@@ -42,7 +42,7 @@ class SmallRange {
  private:
   // tangent of the rotation, largest strain
   static constexpr double kLargestTurn = 0.27, kLargestStrain = 0.3;
-  // Of warnings. From 15 degrees so much farther is 47.
+  // Number of warnings. From 15 degrees so much farther is 47.
   static constexpr uint32_t kMaxWarnings = 2;
   static constexpr double kMuchFarther = 4;
 

@@ -505,7 +505,7 @@ static inline void stresses(const Block &b, const uint32_t *cells, double *out) 
   return b.fiber ? cell_stresses<kLinear, true>(b, cells, out) : cell_stresses<kLinear, false>(b, cells, out);
 }
 
-// Of the volume change a cell has the share k V/2 mean(change^2) of its corners: the sum over the cells is
+// A cell has the share k V/2 mean(change^2) of its corners of the volume change: the sum over the cells is
 // that over the points.
 DEFORM_INLINE v4 nodal_energy(const Block &b, const Four &q, const v4 *e) {
   v4 way[6];
@@ -560,7 +560,7 @@ DEFORM_INLINE v4 direct_stiffness(uint32_t energy, const Four &q, const model::P
   return ((m - m / n1) + (splat(2) * (m * longest)) / (n1 * n1)) + (l * area + by * sqrt4(longest));
 }
 
-// Of cells that resist collapse or soon will: C (dJ)^2 - p d2J at most, times the volume.
+// The stiffness of cells that resist collapse or soon will: C (dJ)^2 - p d2J at most, times the volume.
 DEFORM_INLINE v4 collapse_stiffness(const Block &b, const Four &q, const model::Polar<Wide> &o) {
   const v4 zero = splat(0), square = splat(0.5) * (o.constant + o.n * o.n);  // |C|^2
   const v4 longest = max4(most_of(o.n, square), zero), pairs = splat(0.5) * (o.n * o.n - square);

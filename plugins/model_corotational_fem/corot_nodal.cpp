@@ -107,7 +107,7 @@ void Body::find_far_points(Patches &to) const {
   }
 }
 
-// Of the block (i, j), i <= j, both in one patch.
+// The slot of the block (i, j), i <= j, both in one patch.
 uint32_t Body::slot_of(const Patches &in, uint32_t i, uint32_t j) const {
   if (i == j) return i;
   const uint32_t *const all = in.far_point.data(), *const end = all + in.far_begin[i + 1];
@@ -116,7 +116,8 @@ uint32_t Body::slot_of(const Patches &in, uint32_t i, uint32_t j) const {
   return npoint + model::find_edge(edges.data(), nedge, i, j);
 }
 
-// Of the volume change of each patch's point, or of its rate by the velocities, times what divides it.
+// Finds the gradients of the volume change of each patch's point, or of its rate by the velocities, times
+// what divides it.
 void Body::find_gradients(const dfm_kin &k, bool damped) {
   std::fill(patches.gradient.data(), patches.gradient.data() + 3 * size_t(patches.begin[npoint]), 0.0);
   for (uint32_t c = 0; c < ncell; ++c) {

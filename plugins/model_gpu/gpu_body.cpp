@@ -136,7 +136,8 @@ double Body<Of>::own_frequency() {
   return std::sqrt(slowest);
 }
 
-// Of first order (doc/models/msm_gpu.md), where that of the library is of the second (doc/concepts/step.md).
+// The estimate is of first order (doc/models/msm_gpu.md), where that of the library is of the second
+// (doc/concepts/step.md).
 template <class Of>
 void Body<Of>::find_lag() {
   parts_.lag = 0;

@@ -31,12 +31,12 @@ class Springs : public Parts, public msm::Material {
   void add_growth(const dfm_kin &k, double *ksum, double *csum);
   Work work() const;
   uint32_t count() const { return nspring_; }
-  // Of springs, then of cells.
+  // Energies of springs, then of cells.
   uint32_t energies() const { return nspring_ + (cells_on ? ncell : 0); }
   double energy(const dfm_kin &k, uint32_t begin, uint32_t end) const;
   const char *idle(Param which) const { return Material::idle(msm::Param(which)); }
 
-  // Of points and edges [n,2] alone, and their stiffness (N/m) and square of the rest length (m2).
+  // Lays out points and edges [n,2] alone, and their stiffness (N/m) and square of the rest length (m2).
   void lay_out(const dfm_host *h, uint32_t points, uint32_t n, const uint32_t *springs);
   void put(const double *stiffness, const double *rest_square);
 

@@ -87,7 +87,7 @@ void Vulkan::open_instance() {
 #undef DEFORM_GPU_GET
 }
 
-// Of equals the first that the driver lists.
+// Chooses the first that the driver lists among equals.
 VkPhysicalDevice Vulkan::choose(Wanted wanted) {
   uint32_t n = 0;
   must(EnumeratePhysicalDevices(instance_, &n, nullptr), "vkEnumeratePhysicalDevices");

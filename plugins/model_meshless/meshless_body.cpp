@@ -63,7 +63,7 @@ void Body::gradient_of(const double *x, uint32_t stride, uint32_t point, double 
   }
 }
 
-// Of x with its gradient, or of v with its rate.
+// The residual of x with its gradient, or of v with its rate.
 static void residual_of(const double *x, uint32_t stride, uint32_t i, uint32_t j, const double *gradient,
                         const double *away, double *out) {
   const double *const own = x + size_t(stride) * i, *const at = x + size_t(stride) * j;

@@ -159,7 +159,7 @@ DEFORM_INLINE __m512d row_of_spring(int k, __m512d along, __m512d all, __m256d d
   return _mm512_mask_add_pd(row, 0x0f, row, _mm512_permutexvar_pd(lane, all));
 }
 
-// Of plain springs, as spring_rows of msm_kernel_quad.h.
+// Rows of plain springs, as spring_rows of msm_kernel_quad.h.
 static void spring_rows8(const Block &b) {
   for (uint32_t n = 0; n < b.local; ++n) _mm512_store_pd(b.row + 8 * size_t(n), _mm512_setzero_pd());
   const auto add = [&b](uint32_t n, __m512d row) __attribute__((always_inline)) {

@@ -8,7 +8,7 @@
 namespace msm {
 namespace {
 
-// Of every lane.
+// The same for every lane.
 template <class Ops>
 struct Three {
   typename Ops::V x, y, z;

@@ -71,7 +71,7 @@ DEFORM_INLINE void store_rows(const Three &f, float *out) {
   *reinterpret_cast<vf *>(out + 2 * kLanes) = low_pairs(b, d);
   *reinterpret_cast<vf *>(out + 3 * kLanes) = high_pairs(b, d);
 }
-// Of lane 4 g + k, from what store_rows left.
+// The row of lane 4 g + k, from what store_rows left.
 DEFORM_INLINE v4 row_of(const float *out, uint32_t g, uint32_t k) {
   return load4_single(out + kLanes * k + 4 * g);
 }
@@ -80,7 +80,8 @@ DEFORM_INLINE Three metres(const Three &whole, float unit) {
           __builtin_convertvector((vi)whole.z, vf) * unit};
 }
 
-// Of a point by four times its number, which is an address beside that of the first without a shift.
+// The place of a point by four times its number, which is an address beside that of the first without a
+// shift.
 DEFORM_INLINE const __m128i *place(const SingleBlock &b, uint32_t n4) {
   return reinterpret_cast<const __m128i *>(reinterpret_cast<const double *>(b.at) + n4);
 }

@@ -121,8 +121,8 @@ class Body {
   double looked_ = 0;                      // near_most_ at the last look at all cells
   double near_time_ = 0;                   // s, at the last step's end
 
-  // Of the step at hand, from predict on. Points are in the frame of its start where not said otherwise,
-  // [padded 3 npoint]; modes [modes].
+  // State of the step at hand, from predict on. Points are in the frame of its start where not said
+  // otherwise, [padded 3 npoint]; modes [modes].
   double h_ = 0;
   bool soft_ = false;    // backward Euler: the body was touched
   bool moving_ = false;  // held points move

@@ -119,8 +119,8 @@ struct Boundary::Triangle {
   uint32_t corner[3];
   double y[3][3], n[3], c[3][3], center[3];  // c: n x gradient of a corner's shape function
   double area, radius;                       // radius: about the center
-  // Of the side from each corner to the next: direction, outward normal in the plane, length. Gradients of
-  // the shape functions.
+  // Each side, from its corner to the next: direction, outward normal in the plane, length. Gradients of the
+  // shape functions.
   double along[3][3], beside[3][3], side[3], gradient[3][3];
 
   void take(const uint32_t *corners, const double *const *x) {

@@ -26,7 +26,7 @@ class Boundary {
   void assemble(const char *id, const Kernels &kernels, const double *rest, double young, double poisson,
                 double *block);
 
-  // Of the stiffness without these components of all points, which are to be zero in solve.
+  // Factorizes the stiffness without these components of all points, which are to be zero in solve.
   void factorize(const Kernels &kernels, const double *block, const std::vector<uint8_t> &out);
 
   // kWide vectors side by side, [3 npoint,kWide]: forces of inner points go to the surface; displacements of
@@ -41,8 +41,8 @@ class Boundary {
  private:
   struct Triangle;
   const dfm_host *host_ = nullptr;
-  // Of the quadrature, before the projections: the norm of forces under rigid motions, over that of the
-  // stiffness; the difference of an integral over two triangles and the one in the other order, over the
+  // Errors of the quadrature, before the projections: the norm of forces under rigid motions, over that of
+  // the stiffness; the difference of an integral over two triangles and the one in the other order, over the
   // largest integral.
   double rigid_error_ = 0, asymmetry_ = 0;
   size_t ntriangle() const { return triangles_.size() / 3; }

@@ -185,7 +185,7 @@ void Elastic::find_rigid() {
   orthonormalize(row, size, product_of);
 }
 
-// Of three points far from each other.
+// Finds three points far from each other.
 void Elastic::find_pins() {
   const auto farthest = [&](const auto &measure) {
     uint32_t best = 0;

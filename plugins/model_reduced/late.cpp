@@ -238,7 +238,7 @@ void Body::displacement_of(const double *state, double *u, double *w) {
   if (condensed_) add_rest_of(state, u);
 }
 
-// Of what the forces of the state call for at rest, what the modes leave out: one sparse solve.
+// Adds what the modes leave out of what the forces of the state call for at rest: one sparse solve.
 void Body::add_rest_of(const double *state, double *u) {
   double *const f = f_.data();
   const double *const force = state + at_impulse();
@@ -383,7 +383,7 @@ void Body::watch_near(const dfm_kin &k, bool touched) {
   warn_gradient(k.t, most, "along an edge of point", which);
 }
 
-// Of the displacement u_, where the edges say that it may be worth it.
+// Looks at the cells of the displacement u_, where the edges say that it may be worth it.
 void Body::look_at_cells() {
   const double most_of_edges = std::max(near_most_, sweep_most_);
   if (kEdgesSeeAtLeast * kLargestGradient > most_of_edges || most_of_edges <= kAnotherLook * looked_) return;

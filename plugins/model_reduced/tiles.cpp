@@ -76,7 +76,7 @@ void transpose(const Arithmetic &with, const Tile &from, Tile &out) {
   if (from.thin()) out.right = with.transposed(from.left);
 }
 
-// Of the lower triangle of a: the inverse of its factor.
+// Inverts the factor of the lower triangle of a.
 void invert_factor(Table &a) {
   const size_t n = a.rows;
   for (size_t i = 0; i < n; ++i) {

@@ -53,14 +53,14 @@ class Tiles {
   void set(size_t i, size_t j, Table &&from);                                  // thin, if it can be
   void cut(size_t i, size_t j, const Table &from, size_t row, size_t column);  // from a larger table
   void get(size_t i, size_t j, Table &out) const;
-  // Of the lower triangle of a positive definite matrix its factor, inverted on the diagonal. Throws
+  // Factorizes the lower triangle of a positive definite matrix, inverted on the diagonal. Throws
   // kIndefinite.
   void factorize();
   // x = L^-1 x
   void reduce(Tiles &x) const;
   // f -= x_a^T y_b, sums over all tiles of a column of each
   static void subtract_gram(const Tiles &x, size_t a, size_t b, Table &f);
-  // Of kWide vectors side by side, 1 or kLanes: L L^T x = b in place; y += A x; y += A^T x.
+  // For kWide vectors side by side, 1 or kLanes: L L^T x = b in place; y += A x; y += A^T x.
   template <size_t kWide>
   void solve(double *x) const;
   template <size_t kWide>

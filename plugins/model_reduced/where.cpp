@@ -36,8 +36,9 @@ Frame Body::frame_of(const double *x, size_t stride, const double *v, double h) 
   return f;
 }
 
-// Of a body that is held in some components only: has its pose turned it against the axes they are of? A pose
-// turns it as a whole; a body that was saved while it sagged is turned in the mean, and deformed as much.
+// Whether the pose of a body that is held in some components only has turned it against the axes they are of.
+// A pose turns it as a whole; a body that was saved while it sagged is turned in the mean, and deformed as
+// much.
 bool Body::is_rotated(const dfm_kin &k) const {
   double c[3] = {}, rest[3] = {}, spread[9] = {}, r[9];
   for (size_t i = 0; i < elastic_.npoint; ++i)
@@ -75,7 +76,7 @@ void Body::displacement(const dfm_kin &k, const Frame &f, double *u) const {
   }
 }
 
-// Of the held components at x + h v, zero elsewhere. False: none to speak of.
+// The displacement of the held components at x + h v, zero elsewhere. False: none to speak of.
 bool Body::held_displacement(const dfm_kin &k, const Frame &f, double h, double *u) const {
   double most = 0;
   std::fill(u, u + size(), 0.0);

@@ -53,7 +53,7 @@ static void destroy(void *self) {
   net->host->release(net->host->ctx, net, net->bytes, 64);
 }
 
-/* Of edge n as it is now; a and b: where its points stand in arrays of the host. */
+/* The length of edge n as it is now; a and b: where its points stand in arrays of the host. */
 static double edge(const Net *net, const dfm_kin *kin, size_t n, size_t *a, size_t *b, double e[3]) {
   *a = (size_t)net->edges[2 * n] * kin->stride;
   *b = (size_t)net->edges[2 * n + 1] * kin->stride;

@@ -1,5 +1,5 @@
 """Rules about the form of code that hold where no clang-format is installed: width of a line, one statement
-each."""
+each, comments that begin with what they are about."""
 import re
 
 from tree import CODE, line_of
@@ -97,4 +97,14 @@ def statements(tree):
                        f"several statements joined by commas; write one each: {statement[:60]}")
 
 
-RULES = {"columns": columns, "statements": statements}
+def subjects(tree):
+    """A comment begins with what a thing is or does, not with "Of", which leaves that to the reader."""
+    for path in tree.paths:
+        content = tree.text(path)
+        if path.endswith(CODE) and not path.startswith("tests/") and content is not None:
+            for match in re.finditer(r"^[ \t]*(?://|/?\*+) Of [a-z]", content, re.M):
+                yield (path, line_of(content, match.start()),
+                       'a comment begins with "Of"; begin with what the thing is or does')
+
+
+RULES = {"columns": columns, "statements": statements, "subjects": subjects}

@@ -140,7 +140,7 @@ void check_slot_table(const Ops &ops, bool law) {
   check_slots(slot_rows(ops.slots, ops.nslot, ops.slot_size), law);
 }
 
-// Of dfm_friction.state and of DFM_EXT_SLOTS.
+// Checks the tables of dfm_friction.state and of DFM_EXT_SLOTS.
 void check_own_slots(const dfm_slots *own, bool law, const char *from, const char *remedy) {
   const auto rows = slot_rows(own);
   if (!rows) broken("%s, so the host cannot keep its state; %s", from, remedy);

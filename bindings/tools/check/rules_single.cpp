@@ -12,7 +12,8 @@ namespace cli::check {
 namespace {
 
 constexpr double kShaken = 0.02;  // of an edge
-// Of the largest force: a strain of that size has 17 bits left of 24, less a digit for the sum at a point.
+// As a share of the largest force: a strain of that size has 17 bits left of 24, less a digit for the sum at
+// a point.
 constexpr double kClose = 1e-4;
 constexpr double kSum = 1e-12;  // of all forces
 

@@ -8,8 +8,8 @@
 
 namespace cli::check {
 
-// Of processor time for one rule; ten times that of the clock. What neither computes nor may run for `still`
-// seconds waits for something that never comes.
+// Processor time for one rule; the clock's limit is ten times that. What neither computes nor may run for
+// `still` seconds waits for something that never comes.
 struct Limits { double seconds = 10, still = 5; };
 
 // What a rule is about to do: named where its process ends without an answer.

@@ -16,7 +16,7 @@ std::vector<Fenced *> Fenced::all;
 
 namespace {
 
-// Of all systems: a name that one lacks is found nowhere.
+// Names of all systems: one that a system lacks is found nowhere.
 constexpr const char *kForbidden[] = {
     // memory; the _Z names are operator new in its forms
     "malloc", "calloc", "realloc", "reallocarray", "free", "posix_memalign", "aligned_alloc", "memalign",

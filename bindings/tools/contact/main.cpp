@@ -71,7 +71,7 @@ std::string of_siconos(const fs::path &path) {
   return out.str();
 }
 
-// Of problems of one kind.
+// Sums over problems of one kind.
 struct Sums {
   const char *kind;
   uint32_t read = 0, solved = 0;

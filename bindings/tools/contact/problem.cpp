@@ -44,7 +44,7 @@ void copy_rows(const C &from, size_t width, const std::vector<uint32_t> &rows, C
               from.begin() + std::ptrdiff_t(width * (i + 1)));
 }
 
-// Of a list in which kNone stands for what is left out: the others get numbers in their order.
+// Numbers a list in which kNone stands for what is left out: the others get numbers in their order.
 uint32_t number_all(std::vector<uint32_t> &used) {
   uint32_t n = 0;
   for (uint32_t &u : used)

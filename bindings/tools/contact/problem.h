@@ -55,8 +55,8 @@ struct ContactProblem {
   ContactState state;                 // what the laws start from, and the law of each contact
   std::vector<LinearMotion> motions;  // by source of the rows' dofs
 
-  // Of an empty problem: the rows of this part with their bodies and the start of the laws, which the caller
-  // names. False: a model cannot tell its forces.
+  // Fills an empty problem with the rows of this part, their bodies and the start of the laws, which the
+  // caller names. False: a model cannot tell its forces.
   bool take(const ContactRows &from, const RowsPart &part, const ContactState &of,
             std::span<ImplicitSystem *const> systems);
   std::string bytes();

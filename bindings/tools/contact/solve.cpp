@@ -13,7 +13,7 @@ using namespace dfm;
 
 namespace {
 
-// Of one contact: u with the term of its friction, r, mu.
+// The natural map of one contact: u with the term of its friction, r, mu.
 double natural_map(Vec3 u, Vec3 r, double mu) {
   const Vec3 z = r - (u + Vec3{mu * cli::plane_length(u.y, u.z), 0, 0});
   const double size = cli::plane_length(z.y, z.z);

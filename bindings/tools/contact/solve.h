@@ -12,7 +12,7 @@ namespace contact {
 
 inline constexpr double kSolved = 1e-8;  // of Siconos' measure
 
-// Of others' problems, sums over the runs.
+// Sums over the runs of others' problems.
 struct Result {
   bool solved = false, implicit = false;
   uint32_t contacts = 0, bonds = 0, rank = 0, runs = 1, passes = 0, steps = 0, products = 0, factors = 0;

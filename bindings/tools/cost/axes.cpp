@@ -130,7 +130,7 @@ class Finder {
       if (lacks(s_, m).empty()) add(model_knobs(m.name), "model");
   }
 
-  // Of a body that is of this model already nothing is changed.
+  // A body that is of this model already keeps its settings.
   Knobs model_knobs(const std::string &model) const {
     Knobs k;
     if (models_of(s_) != model) k.model = model;

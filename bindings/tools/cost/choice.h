@@ -10,7 +10,8 @@ namespace cli::cost {
 
 // Cells of the bodies: the scene's own, second-order tetrahedra, or hexahedra of a lattice under the surface.
 enum class Cells { own, second_order, hexahedra };
-// Of the number of tetrahedra: hexahedra as large as the cubes that 12 of a body-centered lattice make.
+// As a share of the number of tetrahedra: hexahedra as large as the cubes that 12 of a body-centered lattice
+// make.
 inline constexpr double kHexahedron = 1.0 / 12;
 
 // What may be chosen. A word that is empty leaves the scene as it is; others are JSON text.

@@ -17,7 +17,7 @@ struct Quantity {
 };
 using Quantities = std::map<std::string, Quantity>;
 
-// Of a finished run. A probe ends with the last record before a cut takes its cell.
+// The quantities of a finished run. A probe ends with the last record before a cut takes its cell.
 Quantities read_quantities(const std::string &folder);
 
 // What differences are divided by: of positions the root mean square of how far the reference moves, at

@@ -204,7 +204,7 @@ std::string count_of(const Study &study, int row) {
   return formatted("%.0f", study.rows[size_t(row)].job.outcome.cells);
 }
 
-// Of the quantity that decides: in which the bound is largest, then the error.
+// The limit of the quantity that decides: the one with the largest bound, then the largest error.
 Limit deciding(const Study &study) {
   Limit worst;
   worst.bound = -1;

@@ -26,7 +26,7 @@ Quantity beyond(const Quantity &a, const Quantity &b, double weight) {
   return out;
 }
 
-// Of a - b with b - c, over the times of a.
+// The cosine between a - b and b - c, over the times of a.
 double cosine(const Quantity &a, const Quantity &b, const Quantity &c) {
   double uu = 0, uv = 0, vv = 0, at_b[3], at_c[3], rates[3];
   for (size_t i = 0; i < a.t.size(); ++i) {

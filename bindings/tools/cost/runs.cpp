@@ -53,7 +53,7 @@ std::string last_sentence(const std::string &path, const Subject &subject) {
   return text.substr(0, end);
 }
 
-// Of a process that has not ended, by the system's count, which takes a hundredth of a second as its unit.
+// The work of a process that has not ended, by the system's count, whose unit is a hundredth of a second.
 double work_of(pid_t pid) {
   FILE *const file = std::fopen(("/proc/" + std::to_string(pid) + "/stat").c_str(), "r");
   if (!file) return 0;

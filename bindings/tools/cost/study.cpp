@@ -21,12 +21,13 @@ namespace {
 
 constexpr const char *kExplicit = "symplectic_euler";
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-// Of the budget: all slices, on the processors together; the scene as it is. Of what is left after slices:
-// the reference.
+// Shares of the budget: all slices, on the processors together; the reference, of what slices leave; the
+// scene as it is.
 constexpr double kSliceShare = 0.15, kReferenceShare = 0.6, kOwnShare = 0.4;
-// Of the budget: processor time that a run of the reference may take to its first record.
+// Share of the budget: processor time that a run of the reference may take to its first record.
 constexpr double kKnowShare = 0.2;
-// Of the budget: when no more slices are begun, on a machine that has others to serve, and no more of those.
+// Shares of the budget: when no more slices are begun, on a machine that has others to serve, and no more of
+// those.
 constexpr double kSlicesEnd = 0.35, kKnownEnd = 0.45;
 constexpr double kAloneShare = 0.15;  // of the budget: the front once more, alone and with pictures
 constexpr double kPictureTime = 0.5;  // s that pictures may take beside a run
@@ -465,7 +466,7 @@ class Student {
                                    listed(std::numeric_limits<double>::min()));
   }
 
-  // Of a row against another, by quantity.
+  // Errors of a row against another, by quantity.
   std::map<std::string, double> errors(size_t row, const Quantities &against) const {
     std::map<std::string, double> out;
     for (const auto &[name, q] : against) {

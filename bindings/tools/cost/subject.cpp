@@ -49,7 +49,7 @@ void read_offers(dfm_context *context, Subject &out, std::vector<std::string> &f
       &found);
 }
 
-// Of a body's pose: x, y, z, w; the inverse rotation.
+// The inverse rotation of a body's pose: x, y, z, w.
 std::array<double, 4> inverse_rotation(const JsonValue *pose) {
   std::array<double, 4> q{0, 0, 0, 1};
   const JsonValue *rotation = pose ? pose->find("rotation") : nullptr;

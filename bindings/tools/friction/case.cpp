@@ -246,8 +246,8 @@ class CaseReader {
     }
   }
 
-  // Of the load cases only the one that is projected on the cone is what the laws compute
-  // (doc/laws/formulas.md (7)).
+  // The only load case that the laws compute is the one that is projected on the cone (doc/laws/formulas.md
+  // (7)).
   void refuse_other_loads(const FrictionCase &c) const {
     if (c.drive != Drive::loaded) return;
     const std::string form = input_->get("form");
@@ -274,7 +274,7 @@ class CaseReader {
     one("zy", c.z0[1]);
   }
 
-  // Of the case or, as in the reference set, of its input.
+  // The key of the case or, as in the reference set, of its input.
   const JsonValue *time_key(const char *key) const {
     const JsonValue *v = root_.find(key);
     return v ? v : input_->find(key);

@@ -220,7 +220,7 @@ class Rig {
     return element_force(uint32_t(std::stoul(name.substr(1)) - 1));
   }
 
-  // Of a law with several bristles: the force of one, which is its state times its stiffness.
+  // The force of one of several bristles: its state times its stiffness.
   double element_force(uint32_t i) const {
     const int at = law_.tangent(i);
     return at < 0 ? 0.0 : law_.state(uint32_t(at)) * law_.param("k", 1, i);

@@ -42,7 +42,8 @@ class Composer {
   size_t place(const Cell &c) const { return size_t(c[0] + n_[0] * (c[1] + n_[1] * c[2])); }
   uint32_t solid(uint16_t label) const { return label == kOutside ? 0 : group_[label]; }
 
-  // Of the eight voxels around a corner. Only what is neither background nor outside has a surface.
+  // The labels of the eight voxels around a corner. Only what is neither background nor outside has a
+  // surface.
   struct Around { uint16_t label[8]; };
   Around around(const Cell &corner) const {
     Around a;
@@ -114,7 +115,7 @@ class Composer {
     return out;
   }
 
-  // Of all corners of one voxel.
+  // Counts all corners of one voxel.
   int critical_about(const Cell &voxel) const {
     int n = 0;
     for (int b = 0; b < 8; ++b)

@@ -14,7 +14,7 @@ inline double dot(const Vec &a, const Vec &b) { return a[0] * b[0] + a[1] * b[1]
 inline Vec cross(const Vec &a, const Vec &b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
-// Of point i of [n,3] numbers.
+// Point i of [n,3] numbers.
 inline Vec at(const std::vector<double> &x, size_t i) { return {x[3 * i], x[3 * i + 1], x[3 * i + 2]}; }
 
 }  // namespace labels

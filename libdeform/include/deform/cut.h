@@ -144,7 +144,7 @@ DFM_API dfm_status dfm_body_set_cut_delay(dfm_body body, double delay);
  * DFM_E_HANDLE; DFM_E_STATE. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_cut_delay(dfm_body body, double *delay, uint32_t *waiting);
 /** The pieces that have come off a body since the host made it, and that are there, in order of creation.
- * Of a piece: those of the body that it came off.
+ * A piece has those of the body that it came off.
  * @param pieces  [capacity], or NULL with capacity 0, which only counts
  * @return DFM_OK; DFM_E_ARG capacity too small (untouched, *n set); DFM_E_HANDLE. Threads: Any thread. Not
  * during step. Since 0.1. */

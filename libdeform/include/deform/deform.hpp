@@ -400,7 +400,7 @@ class World : public Handle<dfm_world, struct WorldKind>, public WorldQueries<E,
   auto bodies(std::span<dfm_body> out) const { return fill<E, 1>(dfm_world_bodies, raw_, out); }
   auto obstacles(std::span<dfm_obstacle> out) const { return fill<E, 1>(dfm_world_obstacles, raw_, out); }
   auto rigids(std::span<dfm_rigid> out) const { return fill<E, 1>(dfm_world_rigids, raw_, out); }
-  // Of all rigid bodies, in the order of rigids(); `rigids`: empty, or which body each is.
+  // States of all rigid bodies, in the order of rigids(); `rigids`: empty, or which body each is.
   auto rigid_states(std::span<dfm_rigid_state> out, std::span<dfm_rigid> rigids = {}) const {
     return produce<E, uint32_t>([&](uint32_t &n) {
       if (!rigids.empty() && rigids.size() != out.size()) return spans_disagree;
@@ -579,7 +579,7 @@ class Context : public Handle<dfm_context *, struct ContextKind> {
       return dfm_mesh_make(raw_, kind.c_str, size.m, DFM_MESH_SURFACE, triangles, m.put());
     });
   }
-  // Of triangles of the host's: points [n,3], triangles [n,3].
+  // A surface of the host's triangles: points [n,3], triangles [n,3].
   auto make_surface(std::span<const double> points, std::span<const uint32_t> triangles) const {
     return produce<E, Unique<Mesh<E>>>([&](auto &m) {
       return dfm_mesh_create(raw_, rows(points.size(), 3), points.data(), rows(triangles.size(), 3),

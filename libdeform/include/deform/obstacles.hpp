@@ -45,7 +45,7 @@ template <class E>
 class Rigid : public Handle<dfm_rigid, struct RigidKind>, public ObstacleQueries<E, Rigid<E>> {
  public:
   using Handle::Handle;
-  // Of the whole set that the body came with.
+  // Ends the whole set that the body came with.
   static void end(dfm_rigid rigid) noexcept { dfm_rigid_destroy(rigid); }
   auto destroy() const { return E::done(dfm_rigid_destroy(raw_)); }
   static auto register_host(Text name, const dfm_rigid_host &table) {

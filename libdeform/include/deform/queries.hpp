@@ -118,7 +118,7 @@ class WorldQueries {
   }
 };
 
-// Of bodies, obstacles and rigid bodies.
+// What bodies, obstacles and rigid bodies say about sensors.
 template <class E, class Self>
 class SensorQueries {
  public:

@@ -87,9 +87,9 @@ inline const char *sentence(dfm_status s) noexcept {
              : dfm_last_error();
 }
 
-// Of bindings: sets that sentence.
+// For bindings: sets that sentence.
 inline dfm_status fail(dfm_status s, const char *why) noexcept { return dfm_fail(s, why); }
-// Of bindings: files as the library reads and writes its own. take(bytes, n) is called once and
+// For bindings: files as the library reads and writes its own. take(bytes, n) is called once and
 // does not throw.
 template <class Take>
 dfm_status read_file(const char *path, uint64_t limit, const char *expected, Take &&take) noexcept {

@@ -17,7 +17,7 @@ dfm_params params_of(const dfm_params *given) {
   return given ? *given : none;
 }
 
-// Of one entry.
+// Makes a switch from one entry.
 Switch make_switch(const Body &b, const dfm_switch &s, double after) {
   need(s.type, "type");
   if (!std::isfinite(s.t) || s.t < after)

@@ -243,7 +243,7 @@ void add_scene(const World &w, const dfm_stream_def &d, Packets &out) {
 
 // ---- the same in packets for a network
 
-// Of rows of three floats; in each direction, in the range that they have.
+// Adds rows of three floats, quantized in each direction in the range that they have.
 void add_quantized(Bytes rows, Packets &out) {
   const size_t n = rows.size() / 4;
   const auto at = [&](size_t i) {

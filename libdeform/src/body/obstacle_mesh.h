@@ -36,7 +36,7 @@ struct ObstacleMesh {
   // All triangles whose own boxes in the world overlap this one, and some beside them, ascending. Boxes are
   // parallel to the axes of the world. Returns how many boxes of the tree it has looked at.
   uint64_t triangles_near(Vec3 lo, Vec3 hi, std::vector<uint32_t> &out) const;
-  // Of x, axis-parallel; computed once in each place.
+  // The axis-parallel bounds of x; computed once in each place.
   const Extent &bounds();
 
  private:

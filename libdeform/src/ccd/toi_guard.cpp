@@ -48,7 +48,7 @@ Vec3 apart(const Features &f, const Vec3 *way = nullptr, Vec3 *moved = nullptr) 
   return w[0] * x[0] + w[1] * x[1] + w[2] * x[2] + w[3] * x[3];
 }
 
-// Of the contact offset: a smaller rest distance is zero but for rounding, and cannot be kept.
+// Share of the contact offset: a smaller rest distance is zero but for rounding, and cannot be kept.
 constexpr double kMinShare = 1e-6;
 
 // Features beside copies rest at another distance, and the floor is in proportion to it; not above 0: none.

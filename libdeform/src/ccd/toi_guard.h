@@ -102,9 +102,9 @@ struct GuardBlocks {
 void guard_near(GuardScene &scene, const Array<Candidate> &list, ListMemory &memory, Array<uint32_t> &near,
                 GuardBlocks *blocks = nullptr, Tasks *tasks = nullptr);
 
-// Of the candidates that `which` names, those between two surfaces; those that touch at the start are
-// passed over: what is through already cannot be kept out. out is cleared; hits come in the order of the
-// list. Does not allocate once out's capacity has settled.
+// Checks those of the candidates that `which` names that are between two surfaces; those that touch at the
+// start are passed over: what is through already cannot be kept out. out is cleared; hits come in the order
+// of the list. Does not allocate once out's capacity has settled.
 void guard_pairs(GuardScene &scene, const Array<Candidate> &list, std::span<const uint32_t> which,
                  Array<GuardHit> &out);
 

@@ -28,7 +28,7 @@ struct Features {
   const uint32_t *corner[2];
   int split;
 
-  // Of sides a and b as the candidate names them.
+  // Sides a and b as the candidate names them.
   Features(GuardSide &a, GuardSide &b, const Candidate &c) : side{&a, &b} {
     // a vertex of the mesh and a triangle of the body
     if (c.obstacle && c.kind == 2) std::swap(side[0], side[1]);

@@ -35,7 +35,7 @@ struct Bond {
   Vec3 rate;        // m/s
   double soft;      // 1/kg
   double softness;  // share of the surfel's own response that is added to soft
-  // Of a drag: unit length; N s; J. Else `along` is zero.
+  // A drag's direction, unit length, its limit, N s, and its work, J. Otherwise `along` is zero.
   Vec3 along;
   double most, max_work;
   bool drags() const { return along.x != 0 || along.y != 0 || along.z != 0; }

@@ -23,7 +23,7 @@ Drag drag_of(const ContactRows &rows, uint32_t row) {
   return {paid, paid};
 }
 
-// Of a residual, what the bond's impulse is to bring to zero.
+// The part of a residual that the bond's impulse is to bring to zero.
 Vec3 counted(const ContactRows::BondRow &b, Vec3 r) {
   for (int c = 0; c < 3; ++c)
     if (b.inverse[c][c] == 0) r[c] = 0;

@@ -14,7 +14,7 @@ namespace dfm {
 struct Slope { double a, b, c, d; };
 // How a law is solved: by its slopes, by projection on the disc of radius limit, or not at all (no force).
 enum LawForm : uint8_t { kSmoothLaw, kSetValuedLaw, kNoFriction };
-// Of a smooth law: slope D, and 1 - h w_t D as [m11 m12; m21 m22] with its determinant.
+// A smooth law about a slip: slope D, and 1 - h w_t D as [m11 m12; m21 m22] with its determinant.
 struct LinearLaw {
   Slope slope;
   double m11, m12, m21, m22, det;
@@ -88,7 +88,7 @@ inline Slope dissipative_slope(const ContactState &s, uint32_t i) {
   return {scale * (top - a), turn - scale * b, -turn - scale * b, scale * (top - c)};
 }
 
-// Of a smooth law, for a contact with this response over the sub-step, s/kg.
+// Linearizes a smooth law, for a contact with this response over the sub-step, s/kg.
 inline LinearLaw linear_law(const ContactState &s, uint32_t i, double response) {
   LinearLaw l;
   l.slope = dissipative_slope(s, i);

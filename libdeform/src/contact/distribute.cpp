@@ -12,7 +12,7 @@ const ImpulseSink &sink_of(std::span<const ImpulseSink> sinks, uint32_t node) {
            1);
 }
 
-// Of a surfel that is a point: the point's impulse is the surfel's.
+// A surfel that is a point passes its impulse to that point.
 void pass_on(const ImpulseSink &s, uint32_t surfel) {
   if (s.phyxel && s.surface->identity())
     store3(s.phyxel + size_t(4) * s.surface->point[surfel], load3(s.surfel + size_t(3) * surfel));

@@ -265,8 +265,9 @@ Pair ContactNewton::stop_of(uint32_t k) const {
   return {lh_[at + 1] - rho * u_[at + 1], lh_[at + 2] - rho * u_[at + 2]};
 }
 
-// Of a set-valued law as the pass began with it, at the present normal impulse. A limit that falls with the
-// slip is renewed by passes, as multipliers are: evaluated here, contacts would stick and slip in turns.
+// The disc that a set-valued law had at the start of the pass, at the present normal impulse. A limit that
+// falls with the slip is renewed by passes, as multipliers are: evaluated here, contacts would stick and slip
+// in turns.
 Disc ContactNewton::disc_at(uint32_t k) const {
   const Pair stop = stop_of(k);
   const double ln = l_[3 * size_t{k}];

@@ -34,8 +34,8 @@ inline Pair on_disc(double a, double b, double radius) {
   return {radius / size * a, radius / size * b};
 }
 
-// Of the limit of a set-valued law that slips along the unit vector e: how it grows with the normal force,
-// and, N s/m, with the speed.
+// How the limit of a set-valued law that slips along the unit vector e grows with the normal force, and, N
+// s/m, with the speed.
 inline double limit_growth(const ContactState &s, uint32_t i) {
   const size_t n = s.stride;
   return std::sqrt(s.dft_dfn[i] * s.dft_dfn[i] + s.dft_dfn[n + i] * s.dft_dfn[n + i]);
@@ -46,9 +46,9 @@ inline double viscous_slope(const ContactState &s, uint32_t i, double e1, double
                          e2 * (s.dft_dvt[2 * n + i] * e1 + s.dft_dvt[3 * n + i] * e2)));
 }
 
-// Of a set-valued law, the disc of its friction impulse at the normal impulse ln, for an impulse of this size
-// that would stop the slip. radius: N s; grows: of it, with ln; along: kg, of it, with the slip that others
-// leave, over a response wt.
+// The disc of a set-valued law's friction impulse at the normal impulse ln, for an impulse of this size that
+// would stop the slip. radius: N s; grows: its derivative by ln; along: kg, its derivative by the slip that
+// others leave, over a response wt.
 struct Disc { double radius, grows, along; };
 inline Disc disc_of(const ContactState &s, uint32_t i, double h, double wt, double size, double ln) {
   const size_t n = s.stride;

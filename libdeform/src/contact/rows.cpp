@@ -23,7 +23,7 @@ ContactRows::ContactRows(const Memory &m) : kernels_(dense_kernels()) {
              every_block_, whole_of);
 }
 
-// Of the dofs from `first` on.
+// Adds a block of the dofs from `first` on.
 void ContactRows::add_block(uint32_t from, uint32_t first, uint32_t group) {
   const uint32_t count = ndof - first;
   blocks.push_back({from, first, count, response_.size(), group});
@@ -283,7 +283,7 @@ Vec3 ContactRows::diagonal(uint32_t i, Vec3 a) const {
 
 namespace {
 
-// Of the largest entry: less is the rounding of a held point, which has a row of zeros.
+// Share of the largest entry: less is the rounding of a held point, which has a row of zeros.
 constexpr double kMoves = 1e-12;
 
 // What nodes answer by themselves, and their bodies as a whole: with these, nodes that are held do not move.

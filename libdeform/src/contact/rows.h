@@ -101,8 +101,8 @@ struct ContactRows {
   // [n,2] 1/kg: W_tn, the slip that a unit normal impulse makes at its own contact
   Array<double> cross;
   Array<double> impulse;  // [all,3] N s: normal, two tangents; of a bond in the world's axes
-  // Of a bond beside that: what its impulse does not depend on the bodies by, and the inverse of its own
-  // W + soft, kg, zero in the components in which nothing moves.
+  // What a bond has beside the impulse: the part of its impulse that does not depend on the bodies, and the
+  // inverse of its own W + soft, kg, zero in the components in which nothing moves.
   struct BondRow {
     Vec3 rate;
     double soft;
@@ -221,7 +221,7 @@ struct ContactRows {
       f(rigid_a[i], load3(&arm_a[size_t(3) * i]), 1.0, turns(arc_a));
   }
   void take_response(const Block &b, size_t along, size_t across);
-  // Of block b, at dof k's component `row`, by a unit impulse of that column.
+  // The response of block b at dof k's component `row` to a unit impulse of that column.
   double response(const Block &b, size_t column, size_t k, size_t row) const {
     return response_[b.response + (column * b.count + k) * 4 + row];
   }

@@ -6,9 +6,9 @@
 namespace dfm {
 
 struct SolveSettings {
-  // Of what an iteration is judged by, left by the one inside of it: of a tolerance by a pass, of a pass by
-  // its steps or sweeps, of a step by its system and line search. Smaller, fewer of the outer ones. What
-  // sticks takes back at most this share of its tolerance.
+  // Share of what an iteration is judged by that the one inside of it may leave: of a tolerance by a pass, of
+  // a pass by its steps or sweeps, of a step by its system and line search. Smaller, fewer of the outer ones.
+  // What sticks takes back at most this share of its tolerance.
   static constexpr double accuracy = 0.3;
 
   // rho w: larger, fewer passes with more Newton steps each. Also the factor by which rho grows where passes
@@ -20,9 +20,9 @@ struct SolveSettings {
   // at rest, after which rows contradict each other. Also sweeps, at most, from one residual to the next,
   // since a residual costs as much as a sweep.
   static constexpr uint32_t rounds = 3;
-  // Of an inner iteration, at most: products of a system, and of all that a factor is kept for; trials of a
-  // line search, since bodies near inversion take steps of a thousandth; Newton steps where all is rigid
-  // (what these do not find, more do not); sweeps that go below what is required, for the next sub-step.
+  // Limit of an inner iteration: products of a system, and of all that a factor is kept for; trials of a line
+  // search, since bodies near inversion take steps of a thousandth; Newton steps where all is rigid (what
+  // these do not find, more do not); sweeps that go below what is required, for the next sub-step.
   static constexpr uint32_t inner = 24;
 
   // Tolerances. gap: of normals, as a share of half of d_c over h. at_rest: of tangents, m/s. of_slip: of

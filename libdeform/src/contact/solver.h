@@ -13,7 +13,7 @@ namespace dfm {
 // slip per friction impulse by which ft_stop is found, the contact's own (rows.wt) or more.
 void set_trial(const ContactRows &rows, const RowsPart &part, double h, const double *response,
                ContactState &state);
-// Of smooth laws what sweeps and residuals need of dft_dvt; after each answer, and after new slopes.
+// Linearizes smooth laws: what sweeps and residuals need of dft_dvt; after each answer, and after new slopes.
 void linearize(const ContactRows &rows, const RowsPart &part, double h, ContactState &state);
 
 // One sweep in contact order. Every contact first gets its normal impulse, then its friction impulse with
@@ -24,7 +24,7 @@ void sweep(ContactRows &rows, const RowsPart &part, const ContactState &law, dou
 // normal impulse never comes below zero.
 void leap(ContactRows &rows, const RowsPart &part, const double *jumps);
 
-// Of residuals: a contact is good where both stay within what they may be off by:
+// Limits of residuals: a contact is good where both stay within what they may be off by:
 //   r_n <= normal[i]                      0.01 (d_c - d_g) / h: the gap is then off by less than a hundredth
 //                                         of its margin; less where laws remember
 //   r_t <= max(tangent[i], 1e-3 |slip|)   1e-6 m/s at rest, which bounds the creep of what sticks
@@ -35,11 +35,11 @@ struct Tolerance {
   double *normal = nullptr, *tangent = nullptr;  // by contact of the rows
 };
 struct ToleranceBounds { double tangent, normal, most_normal; };  // m/s: at rest, at rest, ever
-// Of the laws as they were last evaluated; between evaluations, as they were linearized there.
+// The residual of the laws as they were last evaluated; between evaluations, as they were linearized there.
 Residual residual_of(const ContactRows &rows, const RowsPart &part, const ContactState &laws, double h,
                      const Tolerance &tolerance);
-// Of the impulses of a part: the share, at most 1, at which the function that a solve lowers is least along
-// them, 1/2 l W l + l (u_free + rate). At a solution 1, unless bristles give back what they have stored.
+// The share of a part's impulses, at most 1, at which the function that a solve lowers is least along them,
+// 1/2 l W l + l (u_free + rate). At a solution 1, unless bristles give back what they have stored.
 double share_of_least_work(const ContactRows &rows, const RowsPart &part);
 // of parts together
 Residual larger(const Residual &a, const Residual &b);

@@ -52,7 +52,7 @@ class ByteReader {
     c.resize(n);
     if (n > 0) std::memcpy(static_cast<void *>(c.data()), from, n * sizeof c[0]);
   }
-  // Of things of which so many are left, or that follow, each of some bytes.
+  // Reads a list of things of which so many are left, or that follow, each of some bytes.
   template <class C>
   void count(C &c) {
     uint64_t n = 0;

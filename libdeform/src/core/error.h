@@ -8,7 +8,7 @@
 
 #include "deform/plugin.h"
 
-// Of a function with a format as of printf; that of mingw-w64 has a name of its own.
+// Marks a function with a format as of printf; that of mingw-w64 has a name of its own.
 #ifdef __MINGW_PRINTF_FORMAT
 #define DEFORM_PRINTF(text, first) __attribute__((format(__MINGW_PRINTF_FORMAT, text, first)))
 #else

@@ -61,7 +61,7 @@ class BladeSweep {
   CutShape blade_;
   size_t track_;
   bool fresh_ = true;
-  // Of the cells near the edge, ascending. There may be thousands, and few are at the edge: what is looked at
+  // The cells near the edge, ascending. There may be thousands, and few are at the edge: what is looked at
   // for all of them is little, and together in memory.
   std::vector<uint32_t> cells_, place_;  // place_ [ncell]: of each cell in cells_, or kNone
   std::unique_ptr<double[]> was_, is_;   // [cells_,4] m, their middles

@@ -23,7 +23,7 @@ struct Lasting {
   Array<uint32_t> feature_a, feature_b;
   std::vector<uint8_t> ended;  // [contacts of the store] 1: its feature is gone
 
-  // Of the body whose id the first target has. before: its shape before the cut.
+  // For the body whose id the first target has. before: its shape before the cut.
   Lasting(const World &w, const BodyShape &before, const std::vector<CutTarget> &targets);
 };
 

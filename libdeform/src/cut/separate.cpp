@@ -132,7 +132,7 @@ std::string free_name(World &w, const std::string &whole, uint32_t &number) {
   }
 }
 
-// Of the cells that go.
+// Reports the cells that go.
 void report_removed(const Body &b, const Parts &parts, CutReport &out) {
   std::vector<uint8_t> seen(b.p.n);
   for (size_t c = 0; c < parts.of.size(); ++c) {

@@ -31,7 +31,7 @@ bool has_edge(const Tool &t) { return t.def.shape == DFM_TOOL_BLADE || t.def.sha
 
 // ---- edges ----------------------------------------------------------------------------------------------
 
-// Of a part, in its frame: the edge, and the far side of the blade behind it.
+// A cutting part in its frame: the edge, and the far side of the blade behind it.
 struct Plate { Vec3 edge[2], back[2]; };
 Plate plate_of(const Tool &t, size_t part) {
   const Vec3 h = load3(t.def.half_size);

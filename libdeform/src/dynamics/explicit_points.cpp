@@ -233,7 +233,7 @@ dfm_kin ExplicitPoints::seen(double time, double h, bool trial) const {
   return k;
 }
 
-// Of the edges, against their lengths at rest.
+// The largest strain of the edges, against their lengths at rest.
 double ExplicitPoints::largest_strain() const {
   double most = 0;
   for (size_t e = 0; e < edges_.size(); e += 2) {

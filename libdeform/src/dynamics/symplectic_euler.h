@@ -25,8 +25,8 @@ inline double stable_step(double k, double c, double m) {
 // s, the longest lag of dampers that are `ratio` (s) times the springs beside them, in a body whose slowest
 // uniform strain has this angular frequency (doc/concepts/step.md, "Dampers").
 double damper_lag(double ratio, double frequency);
-// Of all points. ksum, csum: [n] row sums of K and C (N/m, N s/m). worst: the point
-// that bounds, or n.
+// The stable step of all points. ksum, csum: [n] row sums of K and C (N/m, N s/m). worst: the point that
+// bounds, or n.
 double stable_step(const Phyxels &p, const double *ksum, const double *csum, uint32_t *worst);
 
 }  // namespace dfm

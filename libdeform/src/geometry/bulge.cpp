@@ -34,7 +34,8 @@ struct Maker {
         if (std::find(group.begin(), group.end(), next) == group.end()) group.push_back(next);
       }
   }
-  // Of the joined triangles; exact where the corner and its neighbors lie on a sphere (Max 1999).
+  // The normal of the joined triangles at a corner; exact where the corner and its neighbors lie on a sphere
+  // (Max 1999).
   Vec3 normal(uint32_t corner) const {
     Vec3 sum;
     for (const uint32_t t : group) {
@@ -45,7 +46,7 @@ struct Maker {
     }
     return normalized(sum);
   }
-  // Of the joined triangles, the surfel that lies deepest below a plane.
+  // The surfel of the joined triangles that lies deepest below a plane.
   void deepest(Vec3 on, Vec3 outward, double &most, uint32_t &surfel) const {
     for (const uint32_t t : group)
       for (int k = 0; k < 3; ++k) {

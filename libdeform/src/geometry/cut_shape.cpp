@@ -49,7 +49,7 @@ bool ellipsoid_meets(const CutShape &s, const Vec3 corner[4]) {
   return near_segment({}, scaled(s.way), x, 1);
 }
 
-// Of a convex body along an axis.
+// The extent of a convex body along an axis.
 struct Span { double low, high; };
 
 Span span_of(const Vec3 *x, int n, Vec3 axis) {

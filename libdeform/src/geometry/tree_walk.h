@@ -14,7 +14,7 @@ inline constexpr uint32_t kDepth = 64;       // of a tree of 2^32 triangles it i
 inline constexpr double kRaySlack = 1e-8;    // of all lengths: how far a triangle's box is widened for rays
 inline constexpr double kParallel = 1e-300;  // components of a direction whose inverse would overflow
 
-// Of a search from p: no coordinate of any difference is larger.
+// The largest coordinate of any difference in a search from p.
 inline double length_scale(const BoxTree &tree, Vec3 p) {
   const Box &root = tree.root();
   double far = norm(p);
@@ -65,7 +65,7 @@ class RayBoxes {
     double near;
     double far;
   };
-  // Of the line in the widened box; near above far: it misses.
+  // The part of the line in the widened box; near above far: it misses.
   Span meet(const Box &b) const {
     Span s{0, kFar};
     for (int k = 0; k < 3; ++k) {

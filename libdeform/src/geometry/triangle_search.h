@@ -70,7 +70,7 @@ double ray_triangle(const ShearedRay &ray, Vec3 a, Vec3 b, Vec3 c);
 TriangleOnRay first_on_ray(const Triangles &triangles, Vec3 o, Vec3 unit, double limit,
                            SearchCount *count = nullptr);
 
-// Of least key(squared distance), a function that does not fall, up to and with `limit`.
+// The search is for the least key(squared distance), a function that does not fall, up to and with `limit`.
 enum class DistanceKey : uint8_t { squared, root };
 TriangleNearPoint closest_to(const Triangles &triangles, Vec3 p, DistanceKey key, double limit,
                              SearchCount *count = nullptr);

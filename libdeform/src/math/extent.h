@@ -35,7 +35,7 @@ struct Extent {
   }
 };
 
-// Of points [n,3].
+// The extent of points [n,3].
 template <class Points>
 Extent extent_of(const Points &points) {
   Extent box;

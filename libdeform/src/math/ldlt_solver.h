@@ -56,7 +56,7 @@ class LdltSolver final : public LinearSolver {
   Array<uint32_t> waiting_;                        // supernodes whose updates are on the stack
   Array<double> panels_;                           // scratch: right-hand sides, [slot][3n][kLanes]
 
-  // Of restricted(), in panels of kLanes columns: Y = D^-1/2 L^-1 P S^T.
+  // For restricted(), in panels of kLanes columns: Y = D^-1/2 L^-1 P S^T.
   Array<uint32_t> order_;                // [nsel] the selected points as they are eliminated
   Array<uint32_t> row_;                  // [columns] row of the unit vector; kNone: the column is empty
   Array<uint32_t> reach_begin_, reach_;  // supernodes that a panel reaches

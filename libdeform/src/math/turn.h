@@ -32,7 +32,7 @@ inline Pose operator*(const Pose &a, const Pose &b) {
   return {place(a, b.position), a.rotation * b.rotation};
 }
 inline Pose to_pose(const dfm_pose &p) { return {load3(p.position), unit_quat(p.rotation)}; }
-// Of a dfm_pose or a dfm_rigid_state, with the rotation as it is.
+// Reads a dfm_pose or a dfm_rigid_state, with the rotation as it is.
 template <class State>
 Pose load_pose(const State &s) {
   return {load3(s.position), load_quat(s.rotation)};

@@ -60,7 +60,7 @@ Vec3 place_of(uint32_t node) {
   return {double(kPlace[node][0]), double(kPlace[node][1]), double(kPlace[node][2])};
 }
 
-// Of the place by the three coordinates there, its determinant; points [n,stride].
+// The determinant of the derivative of the place by the three coordinates there; points [n,stride].
 double jacobian(uint32_t nodes, const double *points, size_t stride, const uint32_t *cell, Vec3 at) {
   double value[kMaxNodes];
   Vec3 slope[kMaxNodes], along[3];

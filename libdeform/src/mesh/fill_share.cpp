@@ -22,7 +22,7 @@ class Sampler {
         cuts_(cuts),
         level_(size_t(cuts) + 1, Array<uint32_t>(surface.memory)) {}
 
-  // Of the whole cell, in parts of one.
+  // Shares of the whole cell, in parts of one.
   void run(Site key, const uint32_t *tris, uint32_t ntri, double *share, double *loose) {
     Site site[4];
     corners_of(key, site);

@@ -112,7 +112,7 @@ inline Array<uint32_t> boundary_triangles(const Array<uint32_t> &tets) {
 }
 // Edges of the cells, [n,2], i < j, lexicographic.
 Array<uint32_t> unique_edges(const Memory &memory, uint32_t ntet, const uint32_t *tets);
-// Of the edge between two points in such a list; UINT32_MAX: there is none.
+// The number of the edge between two points in such a list; UINT32_MAX: there is none.
 uint32_t edge_number(const Array<uint32_t> &edges, uint32_t a, uint32_t b);
 inline Array<uint32_t> unique_edges(const Array<uint32_t> &tets) {
   return unique_edges(*tets.get_allocator().memory, static_cast<uint32_t>(tets.size() / 4), tets.data());

@@ -25,7 +25,7 @@ struct Run {
   const uint32_t *points;
   uint64_t n;
   const uint8_t *in_msh;  // mesh/cells.h
-  // Of element t, in the file's order.
+  // Corner k of element t, in the file's order.
   uint32_t point(uint64_t t, uint32_t k) const { return points[corners * t + (in_msh ? in_msh[k] : k)]; }
 };
 

@@ -164,7 +164,7 @@ void voxel_triangle(const Pair &pair, Run run, Array<ContactPoint> &out);
 // A contact on `q` of the body (nodes and weights already set), on `o` of the obstacle.
 void finish(const Pair &pair, ContactPoint &c, Vec3 q, Vec3 o, Vec3 normal, double distance, uint32_t patch,
             Array<ContactPoint> &out);
-// Of these surfels against the obstacle's surface at o.
+// The reach of these surfels against the obstacle's surface at o.
 double reach_of(const Pair &pair, std::span<const uint32_t> nodes, Vec3 o);
 // A body against a mesh without dofs: pair.b is the mesh, and its nodes come after those of all bodies.
 void mesh_obstacle(const Pair &pair, const ObstacleView &view, uint8_t kind, Run run,

@@ -57,8 +57,8 @@ bool slides_in(Vec3 p0, Vec3 u, Vec3 q0, Vec3 w, double s, double t, Vec3 v, dou
 
 namespace {
 
-// Of the rest distance: with the depth that a contact may keep before it opens at once (contact/rows.cpp), it
-// stays above the distance at which the guard acts, half of the rest distance.
+// Share of the rest distance: with the depth that a contact may keep before it opens at once
+// (contact/rows.cpp), it stays above the distance at which the guard acts, half of the rest distance.
 constexpr double kIndentation = 0.3;
 
 // Does a vertex this near an edge make a contact of its own there: over one of the edge's faces, or off the

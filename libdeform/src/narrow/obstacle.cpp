@@ -152,7 +152,7 @@ bool off_an_edge(const ObstacleShape &shape, const ObstaclePoint &o) {
   return true;
 }
 
-// Of a box edge contacts have numbers below this, and the faces that bulges touch have those from it on.
+// Contacts of a box edge have numbers below this, and the faces that bulges touch have those from it on.
 constexpr uint32_t kFaces = 32;
 // Newton's steps to the place that is nearest to a round obstacle; to a flat one the first is exact.
 constexpr int kPlaces = 8;

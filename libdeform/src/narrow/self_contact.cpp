@@ -98,7 +98,7 @@ class RestShape {
   }
 
  private:
-  // Of a body with open faces: whether a pair without copies is on different sides of one, or has one in
+  // Whether a pair without copies, of a body with open faces, is on different sides of one, or has one in
   // between. tris: the triangles around the features.
   bool across(std::span<const uint32_t> a, std::span<const uint32_t> tris_a, std::span<const uint32_t> b,
               std::span<const uint32_t> tris_b, double at_rest) const {

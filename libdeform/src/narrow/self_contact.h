@@ -35,7 +35,7 @@ struct SelfPairs {
   double within = 0;  // m, pairs whose `apart` is not less are out of reach
   uint64_t renewals = 0;
   double offset = 0;
-  // Of this sub-step. list: number of the present list.
+  // Follows the surface in this sub-step. list: number of the present list.
   void follow(const Surface &surface, const SelfRest &rest, uint64_t list, double d_c);
 };
 

@@ -26,8 +26,8 @@ bool stays(const IntegratorOption &b) {
 
 }  // namespace
 
-// Of the bodies that alone would be implicit, makes the stiffest ones so where that is cheaper for the world,
-// and further ones only if that is cheaper by another factor of four.
+// Among the bodies that would be implicit if each were the only one, makes the stiffest ones so where that is
+// cheaper for the world, and further ones only if that is cheaper by another factor of four.
 void choose_integrators(std::vector<IntegratorOption> &bodies) {
   Cost rest;  // bodies whose integrator is fixed
   std::vector<size_t> order;

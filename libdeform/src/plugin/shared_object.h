@@ -32,7 +32,7 @@ std::string default_plugin_directory();
 // "static:NAME" of a plugin that is linked into this library (loader.cpp).
 bool is_bundled(const std::string &file);
 
-// Of the system: shared_object_posix.cpp, shared_object_windows.cpp. The file of this library, or of the
+// The system's part: shared_object_posix.cpp, shared_object_windows.cpp. The file of this library, or of the
 // program that it is linked into; empty: unknown.
 std::string file_of_library();
 

@@ -54,8 +54,8 @@ void warn_back_side(dfm_context *context, const World &world, Vec3 gravity) {
   }
 }
 
-// Of its size, that a body may fall in a step from rest. A ball of 3,000 cells of corotational_fem and 0.1 mm
-// radius takes 3 s of processor time for 1/60 s at 3.9 sizes, and 0.4 s in steps of 0.014.
+// Share of its size that a body may fall in a step from rest. A ball of 3,000 cells of corotational_fem and
+// 0.1 mm radius takes 3 s of processor time for 1/60 s at 3.9 sizes, and 0.4 s in steps of 0.014.
 constexpr double kFall = 1;
 // That it falls in the step that is proposed.
 constexpr double kShort = 0.01;

@@ -18,7 +18,7 @@ namespace {
 constexpr uint32_t kCheapCells = 1000;
 // m; a body that is longer is asked for the unit of its file.
 constexpr double kLongestBody = 10;
-// Of the keys of meshes.
+// Prefixes of the keys of meshes.
 const std::string kCells = "cells ", kSurface = "surface ";
 
 // m. All cells of a lattice are alike, so the first one is enough.
@@ -120,9 +120,9 @@ dfm_mesh_handle MeshFiles::cells(const std::string &path, const std::string &poi
   });
 }
 
-// Of a generated mesh, no coarser than its own. A round surface of triangles as large as cells has less
-// volume than the shape: edges are half of those of as many tetrahedra as are asked for, so that both errors
-// fall alike. More hexahedra than there may be are refused where they are made.
+// Makes the surface of a generated mesh, no coarser than its own. A round surface of triangles as large as
+// cells has less volume than the shape: edges are half of those of as many tetrahedra as are asked for, so
+// that both errors fall alike. More hexahedra than there may be are refused where they are made.
 std::string MeshFiles::make_surface(const Body &b) {
   const MadeMesh &m = b.made;
   const std::string pointer = b.pointer + "/mesh";

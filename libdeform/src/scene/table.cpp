@@ -39,7 +39,7 @@ class Table {
     std::string_view line;
     return next_line(line) ? std::string(line) : "";
   }
-  // Of the row that was read last.
+  // Refuses the row that was read last.
   [[noreturn]] void refuse(const std::string &why, dfm_status code = DFM_E_FORMAT) const {
     fail(code, "%s:%zu: %s", path_.c_str(), line_, why.c_str());
   }

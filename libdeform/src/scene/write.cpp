@@ -30,7 +30,7 @@ bool same_bits(const void *a, const void *b, size_t bytes) { return std::memcmp(
 
 Written vector_of(const double *v) { return {v[0], v[1], v[2]}; }
 
-// Of length zero: none, as in dfm_pose.
+// Whether a quaternion turns anything; one of length zero is none, as in dfm_pose.
 bool turned(const double *q) { return q[0] != 0 || q[1] != 0 || q[2] != 0 || (q[3] != 0 && q[3] != 1); }
 
 Written rotation_of(const double *q) { return {{"quaternion", {q[0], q[1], q[2], turned(q) ? q[3] : 1.0}}}; }

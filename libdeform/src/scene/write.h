@@ -63,7 +63,7 @@ struct SceneWriter {
   std::string file(const std::string &name, std::function<void(const std::string &path)> write);
   // The key of a material; empty: it is that of things without one. Adds it to `materials`.
   std::string material(const Material &m);
-  // Of a thing that has no more of it; without a friction: of a body none of whose cells has it.
+  // The material of a thing that has no more of it; without a friction: of a body none of whose cells has it.
   std::string material(const std::string &name, std::optional<double> friction);
   void put_material(Written &out, const Obstacle &of);
   std::string text_file(const std::string &name, std::string text);

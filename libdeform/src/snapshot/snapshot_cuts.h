@@ -68,11 +68,11 @@ class SnapshotShapes {
 // All bodies in id order, including those without cells; not the pieces that a restore has removed.
 std::vector<Body *> all_bodies(const World &w);
 
-// Of cells of a mesh that has ncorner corners of cells, ascending.
+// Whether they are cells of a mesh that has ncorner corners of cells, ascending.
 bool is_valid(const Array<BladeSide> &sides, size_t ncorner);
 bool is_valid(const Array<CutWork> &cut_work, uint32_t npoint);
 bool is_valid(const std::vector<PlannedCut> &cuts);
-// Of a tool that can cut in this way.
+// Whether the tool can cut in this way.
 bool is_valid(const Tool::Cuts &cuts, const Tool &tool);
 // Between cells of the whole body, ascending.
 bool is_valid(const std::vector<AheadFace> &faces, const Body &b);

@@ -9,12 +9,12 @@ struct Body;
 struct Obstacle;
 struct World;
 
-// Of one of them, without its id and name.
+// The structure of one of them, without its id and name.
 uint64_t make_of(const Body &b);
 uint64_t make_of(const Obstacle &o);
-// Of the rest: sets of rigid bodies, tools and self contact.
+// The structure of the rest: sets of rigid bodies, tools and self contact.
 uint64_t rest_of_structure(const World &w);
-// Of all, with ids and names: for a world that was written as a scene and read again.
+// The structure of all, with ids and names: for a world that was written as a scene and read again.
 uint64_t snapshot_structure(const World &w);
 
 }  // namespace dfm

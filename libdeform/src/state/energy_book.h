@@ -5,7 +5,7 @@
 
 namespace dfm {
 
-// Of one body. Lasting state.
+// What is booked for one body. Lasting state.
 struct EnergyBook {
   uint32_t known = 0;  // checks since the host last changed anything; the first few set the base
   double base = 0;     // J, least balance so far, plus the energy that stiff modes may return
@@ -27,7 +27,7 @@ struct ChangeBook {
 
 inline constexpr uint32_t kMaxCredit = 4096;  // sub-steps
 
-// Of the world. Lasting state.
+// The watch over the world's energy. Lasting state.
 struct EnergyWatch {
   // sub-steps without a check, minus the cost of checks: limits new bases if the host changes something in
   // every step

@@ -70,10 +70,10 @@ void share_mass(Body &b, const double *density, double all) {
 // Least part of its mass that a point keeps when moments are set right.
 constexpr double kMinMass = 0.1;
 
-// Of a lattice. Equal shares of a cell's material to its nodes leave no point without mass, but keep neither
-// center nor moments of inertia. So all masses change by factors that are a quadratic polynomial of the
-// place, by which these are those of the material; where a factor would be less than kMinMass, the moments
-// come as near as it allows.
+// Lumps the masses of a lattice. Equal shares of a cell's material to its nodes leave no point without mass,
+// but keep neither center nor moments of inertia. So all masses change by factors that are a quadratic
+// polynomial of the place, by which these are those of the material; where a factor would be less than
+// kMinMass, the moments come as near as it allows.
 void lump_inside(Body &b, const double *density, double all) {
   const size_t tets = cell_kind(b.cell_type).tets, ncell = b.ncell() / tets;
   std::vector<Vec3> place;

@@ -55,9 +55,10 @@ struct Obstacle : ObstacleState {
   // Shape and size, where it is now; of a mesh and voxels the extent alone.
   ObstacleView view() const;
   ObstacleShape standing() const { return ObstacleShape(view()); }
-  // Of a sub-step, in a step whose remaining time is `left`. rest: s, to the end of the planned sub-step, of
-  // which this is a piece if h is less. The obstacle goes straight to where it has to be then: a target that
-  // the guard has put off is caught up with in that time, and not in the first piece, however short.
+  // Where it is at the end of a sub-step, in a step whose remaining time is `left`. rest: s, to the end of
+  // the planned sub-step, of which this is a piece if h is less. The obstacle goes straight to where it has
+  // to be then: a target that the guard has put off is caught up with in that time, and not in the first
+  // piece, however short.
   Pose end_pose(double h, double left, double rest) const;
 };
 

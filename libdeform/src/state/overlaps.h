@@ -35,7 +35,7 @@ struct Overlaps {
       return p.a == a && p.b == b && (p.obstacle != 0) == obstacle;
     });
   }
-  // Of one search of everything; where that fails, the next one is what it would have been.
+  // The mode of one search of everything; where that fails, the next one is what it would have been.
   class Mode {
    public:
     Mode(Overlaps &o, bool Overlaps::*mode) : of_(o), mode_(mode), all_(o.all) { o.all = o.*mode = true; }

@@ -61,7 +61,8 @@ struct Tool {
     std::memcpy(&g, set->extra.data() + kToolValues + row * (sizeof g / sizeof(double)), sizeof g);
     return g;
   }
-  // Of steps that are many to the delay only some: what is kept reaches back as far as the device is late.
+  // Only some steps are kept where many fit into the delay: what is kept reaches back as far as the device is
+  // late.
   bool is_to_remember(double t, const ToolValues &v) const {
     const size_t n = static_cast<size_t>(v.ngiven);
     return motion.late > 0 && (n == 0 || !(t - past((n - 1) % kToolPast).t < motion.late / (kToolPast - 1)));

@@ -45,7 +45,7 @@ struct RigidPair {
   auto operator<=>(const RigidPair &) const = default;
 };
 
-// Of a pair of ids, a body first, or of two rigid things as in RigidPair.
+// The work of a pair of ids, a body first, or of two rigid things as in RigidPair.
 struct PairWork {
   uint64_t a, b;
   double friction;  // J, over the run

@@ -94,7 +94,8 @@ struct StepContext {
   Array<double> bond_impulse;  // [bonds,3] N s, initial values of the next solve of this sub-step
   ContactState state;
   std::unique_ptr<SolveIslands> solve_islands;
-  // Of a program beside the library: before an island is solved, on its thread; with null after all are.
+  // Called for a program beside the library: before an island is solved, on its thread; with null after all
+  // are.
   std::function<void(const SolveIsland *)> on_solve;
   struct { Array<double> normal, tangent; } tolerance;  // [contacts] of all islands
   Residual residual;                                    // the worst of all islands

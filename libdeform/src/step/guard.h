@@ -28,7 +28,7 @@ struct Guard {
   Array<Common> common;     // [bodies] of the surfels' velocities without contact
   uint64_t lists = 0;       // number of rebuilds of broad/ when `memory` began
   uint64_t placements = 0;  // World::placements that `memory` knows of
-  // Of each tested pair the triangles that cross at the start: of a, of b.
+  // The triangles of a tested pair that cross at the start: of a, of b.
   struct Through {
     uint32_t a, b;
     bool obstacle;

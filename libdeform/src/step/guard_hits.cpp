@@ -61,7 +61,7 @@ class HitContact {
   }
 
  private:
-  // Of its way, what is not its velocity: its faces turn, and it is set back elsewhere.
+  // The part of its displacement that is not its velocity: its faces turn, and it is set back elsewhere.
   Vec3 set_back(const GuardSide &side, uint32_t surfel, Vec3 way) const {
     if (side.still || !(side.surface->back > 0)) return {};
     side.surface->each_phyxel(surfel, [&](uint32_t p, double weight) {
@@ -84,7 +84,7 @@ class HitContact {
     from_b_ += std::fabs(weight) * x;
     to_b_ += std::fabs(weight) * end;
   }
-  // Of corner k of a surfel, an edge or a triangle of one side.
+  // The weight of corner k of a surfel, an edge or a triangle of one side.
   double weight_of(bool b, int kind, int k) const {
     if (kind != 1) return kind == 0 ? 1 : hit_.at[k];
     return k == 0 ? 1 - hit_.at[b] : hit_.at[b];
@@ -121,7 +121,7 @@ class HitContact {
     start_ -= from;
     obstacle_way_ = way_of(from, end_.position + rotate(end_.rotation, local));
   }
-  // Of two bodies, or of a body and a mesh, whose vertex may meet a face of the body.
+  // A contact of two bodies, or of a body and a mesh, whose vertex may meet a face of the body.
   void on_surfaces(ContactPoint &out) {
     const uint8_t kind = c_.obstacle ? c_.kind : c_.kind == kEdgeEdge;
     out.type_a = kind;
@@ -207,7 +207,7 @@ const Guard::Kept *find_kept(const Array<Guard::Kept> &kept, const ContactPoint 
   return k == kept.end() || k->key != c.key || k->more != c.more ? nullptr : &*k;
 }
 
-// Of two bodies.
+// The rest distance of two bodies.
 double rests_at(const World &w, const StepContext &step, const ContactPoint &c) {
   const BodyView &a = step.body_views[c.slot_a], &b = step.body_views[c.slot_b];
   if (!parts_of_one(*a.surface, a.id, *b.surface, b.id)) return w.offset;

@@ -24,7 +24,8 @@ void begin_impact(World &w);
 // Makes them implicit again: when it is over, or sooner where explicit time needs too many sub-steps. False:
 // there are none.
 bool end_impact(World &w);
-// Of a step that is taken back: what began or ended an impact. until: w.impact_until before that step.
+// Takes back what began or ended an impact in a step that is taken back. until: w.impact_until before that
+// step.
 void undo_impact(World &w, double until);
 // After each step.
 void follow_impact(World &w, double dt);

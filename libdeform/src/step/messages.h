@@ -18,8 +18,7 @@ std::string names_of(const World &w, uint64_t a, uint64_t b);  // "body 'a' on o
 // points are in or on another one, no motion satisfies attachment and contact.
 const char *hint_of_attachment(const World &w, uint64_t body);
 
-// Of a stage that fails, with the bit of its trouble: the sentence, as of printf, is the last error. Returns
-// false.
+// Fails a stage, with the bit of its trouble: the sentence, as of printf, is the last error. Returns false.
 bool fail_step(uint32_t *trouble, uint32_t bit, const char *format, ...) DEFORM_PRINTF(3, 4);
 
 }  // namespace dfm

@@ -327,8 +327,8 @@ std::string names_of(const std::string &first, size_t count) {
   return format("body '%s' and %zu more are", first.c_str(), count - 1);
 }
 
-// Of bodies that have come since the last step and leave it to the library. Before the first step it is one
-// choice for all of them, in whatever order they came and whatever was queried in between.
+// Chooses for bodies that have come since the last step and leave it to the library. Before the first step it
+// is one choice for all of them, in whatever order they came and whatever was queried in between.
 void choose_integrators(World &w) {
   const auto open = [](const auto &b) { return b->integrator.open; };
   if (std::none_of(w.bodies.begin(), w.bodies.end(), open)) return;

@@ -161,7 +161,7 @@ bool crosses_another(SelfBody &b, uint32_t triangle) {
   return b.crosses[triangle] == yes;
 }
 
-// Of a triangle that crosses another one at the start of the sub-step.
+// Whether the surfel is of a triangle that crosses another one at the start of the sub-step.
 bool is_tangled(SelfBody &b, uint32_t surfel) {
   const Surface &s = b.body->surface;
   const auto fan = s.fan.begin();

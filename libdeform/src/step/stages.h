@@ -111,7 +111,7 @@ bool report_failed_solve(World &w, StepContext &step, const LawInstance *law, ui
 // As fail_step(): the contact solve has no solution, and nothing can move any further.
 bool report_jam(World &w, StepContext &step, uint32_t *trouble);
 void reserve_contacts(World &w, StepContext &step);  // memory for keep_contacts()
-// Of lists to which keep_contacts() and keep_rigids() add.
+// Reserves memory of lists to which keep_contacts() and keep_rigids() add.
 void reserve_reports(World &w, const StepContext &step);
 void keep_contacts(World &w, StepContext &step);  // store, events, hold, work; allocates nothing
 // all, with their events, if the plan has no stage for contacts

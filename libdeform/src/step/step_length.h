@@ -11,7 +11,7 @@ struct StepLength {
   double parts = 1, most_parts = 1;
   double next_piece = 0;  // s, with which the rest of the sub-step begins; 0: as a whole
 
-  // Of the present attempt: the sub-step is to be repeated,
+  // What the present attempt says: the sub-step is to be repeated,
   bool repeats = false;
   double factor = 1;     // so many times as long,
   bool divides = false;  // as the first of `parts`,

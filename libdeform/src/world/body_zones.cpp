@@ -11,7 +11,7 @@
 namespace dfm {
 namespace {
 
-// Of a surface, by points as they are numbered in the def.
+// The triangles of a surface, by points as they are numbered in the def.
 TriangleList triangles_of(const Surface &s) {
   return {s.ntri, [&](size_t k) { return s.identity() ? s.point[s.tri[k]] : s.tri[k]; }};
 }

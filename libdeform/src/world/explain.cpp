@@ -91,7 +91,7 @@ std::string light(const Body &b) {
          join(scaled, ",") + "]}";
 }
 
-// Of the forces that move the body.
+// The precision of the forces that move the body.
 std::string precision(const Body &b) {
   const bool moves = b.dynamics->abilities().placed && b.integrator.used == DFM_INTEGRATOR_SYMPLECTIC_EULER;
   const char *const why = !b.model.single ? "the default"

@@ -91,7 +91,7 @@ bool names_things(World &w, const FrictionRule &rule) {
                      [&](const std::string &side) { return w.find_body(side) || w.find_obstacle(side); });
 }
 
-// Of rules of equal weight the last one wins.
+// The last one of rules of equal weight wins.
 void move_to_end(World &w, FrictionRule *rule) {
   FrictionRule *const end = w.friction.data() + w.friction.size();
   if (std::any_of(rule, end, [&](const FrictionRule &r) { return !names_things(w, r); }) && rule + 1 != end)

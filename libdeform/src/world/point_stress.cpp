@@ -18,8 +18,8 @@ constexpr int kPair[6][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {1, 2}, {2, 0}};
 constexpr double kFlat = 1e-6;                    // of its size: a patch has one layer of cells across
 constexpr double kWeak = 1e-12, kWeakest = 1e-9;  // terms of which the patch says nothing stay small
 
-// Of a cell: its middle, and the means over it of products of the coordinates from there, in the order
-// of kPair.
+// Moments of a cell: its middle, and the means over it of products of the coordinates from there, in the
+// order of kPair.
 struct Moments {
   Vec3 middle;
   double second[6] = {};

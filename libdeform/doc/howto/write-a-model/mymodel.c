@@ -55,14 +55,14 @@ static void destroy(void *self) {
   net->host->release(net->host->ctx, net, net->bytes, 64);
 }
 
-/* Of edge n as it is now; a and b: where its points stand in arrays of the host. */
+/* The length of edge n as it is now; a and b: where its points stand in arrays of the host. */
 static double edge(const Net *net, const dfm_kin *kin, size_t n, size_t *a, size_t *b, double e[3]) {
   *a = (size_t)net->edges[2 * n] * kin->stride;
   *b = (size_t)net->edges[2 * n + 1] * kin->stride;
   return apart(kin->x + *a, kin->x + *b, e);
 }
 
-/* Of the spring alone, and how it changes with the length. */
+/* The pull of the spring alone; along(): how it changes with the length. */
 static double pull_of(const Net *net, double d, size_t n) {
   const double strain = d / net->rest[n];
   return net->k * d * (1 + net->s * strain * strain);

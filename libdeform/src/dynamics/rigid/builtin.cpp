@@ -39,7 +39,7 @@ enum class Drive : uint8_t { off, holds, pushes, pulls };
 struct Group {
   std::vector<uint32_t> parts, joints;
   bool drives = false;  // a motor of it has power
-  // Of this sub-step: what the joints hold, then one row per motor that holds.
+  // In this sub-step: what the joints hold, then one row per motor that holds.
   std::vector<JointRow> rows;
   std::vector<uint32_t> holding;  // those motors' joints
   size_t nhold = 0;
@@ -63,7 +63,7 @@ class Builtin {
   std::vector<RigidJoint> joints_;
   std::vector<uint32_t> group_;
   std::vector<Group> groups_;
-  // Of this sub-step.
+  // In this sub-step.
   std::vector<Drive> drive_;  // [njoint]
   // [n,6] velocities: without joints, with them, with contact too
   std::vector<double> free_, mean_, end_;
@@ -186,7 +186,7 @@ void Builtin::start_from(const dfm_rigid_step &step, const Group &g, const doubl
                                                 base_momentum_[i], step.h));
 }
 
-// Of a row on both of its parts, as far as they move.
+// Adds the impulse of a row to both of its parts, as far as they move.
 void Builtin::add_impulse(const JointRow &r, double impulse, std::vector<double> &velocity,
                           std::vector<Vec3> &momentum) const {
   const auto add = [&](uint32_t part, Vec3 l, Vec3 a) {

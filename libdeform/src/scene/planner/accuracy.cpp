@@ -11,8 +11,8 @@ namespace dfm {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-// Of the proven step: 0.9 is used, and of that the next size below of four to the octave, in the mean over
-// all sizes sum (1 - a/b) / ln 2 over the four pairs of neighbors a < b.
+// Share of the proven step: 0.9 is used, and of that the next size below of four to the octave, in the mean
+// over all sizes sum (1 - a/b) / ln 2 over the four pairs of neighbors a < b.
 constexpr double kOffered = 0.9 * 0.9155;
 
 double at_most(double x, double most) { return x < most ? x : most; }
@@ -45,8 +45,8 @@ const std::vector<CostAt> &costs_of(const MeasuredModel &m, Scheme scheme, const
   return cells_of(m, b).costs[static_cast<size_t>(scheme)][static_cast<size_t>(what_it_meets(b))];
 }
 
-// Of bending: along the power law through the two bars that were measured, by the angles that `estimate`
-// gives for them.
+// The error of bending: along the power law through the two bars that were measured, by the angles that
+// `estimate` gives for them.
 double bending_error(const MeasuredModel &m, double rotation) {
   constexpr double kLittle = 4.0 / 3 * 0.02, kFar = 4.0 / 3 * 0.8;  // rad
   if (m.bends_little <= 0 || m.bends_far <= 0) return std::max(m.bends_little, m.bends_far);
@@ -54,8 +54,8 @@ double bending_error(const MeasuredModel &m, double rotation) {
   return m.bends_little * std::pow(std::max(rotation, 1e-6) / kLittle, std::max(power, 0.0));
 }
 
-// Of the quantity. A force of contact has its own error where the body is dented, and that may be many times
-// the force.
+// The model's error of the quantity. A force of contact has its own error where the body is dented, and that
+// may be many times the force.
 double model_error(const MeasuredModel &m, const BodyRegime &b, const Estimate &e, const Wish &wish) {
   double error = bending_error(m, e.rotation);
   if (b.touches && !b.held) error = std::max(error, m.lies);
@@ -65,8 +65,9 @@ double model_error(const MeasuredModel &m, const BodyRegime &b, const Estimate &
   return dented(b) && wish.force ? std::max(error, m.dent_force) : error;
 }
 
-// Of a held body that a load bends at once. Cells that stiffen it by s let it sag by 1/(1+s) and swing
-// sqrt(1+s) times as fast; without damping the difference in phase grows. Root mean square over the time.
+// The error of a held body that a load bends at once. Cells that stiffen it by s let it sag by 1/(1+s) and
+// swing sqrt(1+s) times as fast; without damping the difference in phase grows. Root mean square over the
+// time.
 double swing_error(const BodyRegime &b, const Estimate &e) {
   constexpr double kStep = 2 * kPi / 16;  // rad
   constexpr int kMin = 64, kMax = 4096;

@@ -34,7 +34,7 @@ enum class Meets { nothing, ground, probe, body };
 inline constexpr size_t kMeets = 4;
 const char *meets_name(Meets meets);  // as a file of costs names it
 
-// Of cells of one kind.
+// What was measured of cells of one kind.
 struct MeasuredCells {
   // The largest explicit step that is proven, over the time in which a pressure wave goes by `cell_size`.
   double wave_steps = 0;

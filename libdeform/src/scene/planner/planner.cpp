@@ -500,7 +500,7 @@ class Reader {
     return out;
   }
 
-  // Of cells that are seen as several tetrahedra each, the edges are not those of these.
+  // The edges of cells that are seen as several tetrahedra each are not those of these.
   void set_mesh(const Body &b, const BodyMesh &mesh, BodyRegime &r) const {
     const dfm_mesh_info &info = mesh.info;
     r.points = mesh.info.npoint;

@@ -83,7 +83,7 @@ class OverlapSides {
   // through: by more than `least`.
   Crossed look(const OverlapPair &p, double least, bool yes_or_no);
 
-  // Of side b.
+  // The shape of side b.
   ObstacleShape shape(const OverlapPair &p) const;
   bool plane(const OverlapPair &p) const;
   Vec3 center(const OverlapPair &p);

@@ -13,7 +13,7 @@ struct StepContext;
 struct World;
 struct Obstacle;
 
-// Of a body with this velocity and spin [6], at an arm from its center.
+// The velocity of a body with this velocity and spin [6], at an arm from its center.
 inline Vec3 velocity_at(const double *v, Vec3 arm) { return load3(v) + cross(load3(v + 3), arm); }
 
 // The same of the body of this shape, as a mean over h seconds: its displacement to third order in the

@@ -99,7 +99,7 @@ void ToolTouch::request_response(Moved &m, uint32_t g) {
   m.first[g] = at;
 }
 
-// Of the group of this side, if it has joints and its response has not been needed yet.
+// Takes the response of the group of this side, if it has joints and its response has not been needed yet.
 void ToolTouch::take_response(const Side &side) {
   Moved &m = sides_[side.tool];
   if (!m.set) return;

@@ -19,8 +19,8 @@
 namespace dfm {
 namespace {
 
-// Of the offset: a pair that carries nothing ends to touch where it has opened by this, as contacts of soft
-// bodies do (step/keep_contacts.cpp).
+// Share of the offset: a pair that carries nothing ends to touch where it has opened by this, as contacts of
+// soft bodies do (step/keep_contacts.cpp).
 constexpr double kApart = 0.1;
 
 }  // namespace

@@ -51,7 +51,7 @@ bool kept_apart(const Obstacle &a, const Obstacle &b) {
 // Planes and voxels have neither corners nor edges, so two of them have no rows.
 bool without_corners(const Obstacle &o) { return o.def.shape == DFM_SHAPE_PLANE || o.grid; }
 
-// Of the rotation vectors that end in the same attitude, whole turns apart, the one nearest to `like`: a ball
+// The rotation vector nearest to `like` among those that end in the same attitude, whole turns apart: a ball
 // that rolls fast turns more than once in a sub-step.
 Vec3 nearest_turn(Vec3 turn, Vec3 like) {
   constexpr double kWhole = 2 * 3.14159265358979323846;
@@ -173,7 +173,7 @@ void ToolTouch::prepare(World &w, SceneFacts &facts) {
         mesh->make_tree(w.meters.obstacles.memory());
 }
 
-// Of the places of a row against each other, by these velocities of their bodies.
+// The velocity of the places of a row against each other, by these velocities of their bodies.
 Vec3 ToolTouch::speed(const Row &row, const std::vector<double> Moved::*of) const {
   const auto at = [&](const Side &side) {
     return velocity_at(&(sides_[side.tool].*of)[6 * size_t{side.part}], side.arm);

@@ -116,7 +116,7 @@ class ToolTouch {
     double dent = 0;                 // m: sharp edges that are further on the wrong side do not touch there
     double reach = 0, turn = 0;      // m, rad: how far its rows of this sub-step keep the two apart
   };
-  // Of a kind of thing, planes aside, which are near everything.
+  // Things of one kind, planes aside, which are near everything.
   struct Things {
     std::vector<uint32_t> slot;
     BoxTree tree;

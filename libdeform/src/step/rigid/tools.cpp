@@ -11,13 +11,13 @@
 namespace dfm {
 namespace {
 
-// Of the passivity controller. Where the hand has got as much as the coupling stores at the force that it is
-// to get, it gets an eleventh of that force; what it has got is forgiven within about a second, so that a
-// steady push is felt again once the loop is quiet.
+// Settings of the passivity controller. Where the hand has got as much as the coupling stores at the force
+// that it is to get, it gets an eleventh of that force; what it has got is forgiven within about a second, so
+// that a steady push is felt again once the loop is quiet.
 constexpr double kSteep = 10;
 constexpr double kForgiven = 1;  // s
 
-// Of the step that begins: where it leads, by keys or by what was said; by its device if it has one.
+// Where the step that begins leads a tool: by keys or by what was said; by its device if it has one.
 ToolValues aimed(const Tool &tool, double end) {
   ToolValues v = tool.values();
   if (v.keyed != 0 && !tool.device.read) store_place(v.target, pose_at(tool.keys, end));

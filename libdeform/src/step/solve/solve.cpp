@@ -84,7 +84,7 @@ void finish_rates(const World &w, StepContext &step) {
 
 }  // namespace
 
-// Of bodies that are set on each other, or by up to d_c into each other. No motion has made this depth, so
+// The depth of bodies that are set on each other, or by up to d_c into each other. No motion has made it, so
 // it opens by a speed, whatever the sub-step: a share per sub-step would throw what is stiff. Faces of a cut
 // have distances of their own, and an equilibrium has no speed to open by.
 double start_depth(const World &w, const StepContext &step, const ContactPoint &c, uint32_t match,

@@ -96,7 +96,7 @@ class SolveIslands {
   void prepare(const World &w, StepContext &step);  // each island, with its blocks and laws
 };
 
-// Of a planned sub-step: no repeated one is shorter.
+// Share of a planned sub-step: no repeated one is shorter.
 inline constexpr double kMinRepeated = 1.0 / 256;
 // Whether a sub-step without a result can be repeated with half its length.
 bool may_shorten(const StepContext &step);

@@ -168,7 +168,7 @@ void sum_energies(World &w, StepContext &step) {
   });
 }
 
-// Of the dofs of contact, and the mean velocities that it does its work at.
+// Books the dofs of contact, and the mean velocities that it does its work at.
 void book_contact(World &w, StepContext &step) {
   step.mean.resize(size_t{kStride} * step.rows.ndof);
   for (uint32_t d = 0; d < step.rows.ndof; ++d) {
@@ -215,7 +215,7 @@ double work_of_contact(const World &w, const StepContext &step, const Body &b, c
   return contact;
 }
 
-// Of a sub-step of backward Euler, r the residual that Newton's method leaves:
+// A sub-step of backward Euler, with r the residual that Newton's method leaves:
 //
 //   M (v' - v) = h (f' + loads + m g) + p + r,  x' = x + h v'
 //
@@ -453,7 +453,7 @@ void book_energy(World &w, StepContext &step, double motion) {
   w.watch.credit = std::min(w.watch.credit + ages, kMaxCredit);
 }
 
-// Of a hidden elastic energy as much is left as was there: at most what the body had and was given, less what
+// Keeps as much of a hidden elastic energy as was there: at most what the body had and was given, less what
 // its place in gravity and in lasting loads has taken.
 void forget_energy(Body &b) {
   forget_contact_gain(*b.world);

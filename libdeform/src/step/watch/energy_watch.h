@@ -28,9 +28,9 @@ const char *unwatched(const World &w, const Body &b);
 bool has_balance(const Body &b);
 // Called after predict. False: a body, or the contact of a pair, has gained too much; the message says which.
 bool watch_energy(World &w, StepContext &step, uint32_t *trouble);
-// Of a body that backward Euler moves, or that steps itself, when the end of the sub-step is known: the
-// energy that it gains beyond the work of contact, weight and loads, over its kinetic and elastic energy at
-// the start or the end, whichever is more. 0 where it is not known.
+// The gain of a body that backward Euler moves, or that steps itself, when the end of the sub-step is known:
+// the energy that it gains beyond the work of contact, weight and loads, over its kinetic and elastic energy
+// at the start or the end, whichever is more. 0 where it is not known.
 double gain_at_end(const World &w, const StepContext &step, const Body &b);
 // Called before commit: books what this sub-step puts into the bodies.
 void book_energy(World &w, StepContext &step, double motion);
