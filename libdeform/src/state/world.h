@@ -163,6 +163,14 @@ struct Entities {
   std::vector<std::unique_ptr<LawInstance>> laws;  // the first is the default law, made when first needed
   uint32_t sensors = 0;                            // how many there are
   uint32_t tearing = 0;                            // bodies that may tear
+
+  // world.cpp
+  Body *find_body(const std::string &name);
+  Obstacle *find_obstacle(const std::string &name);
+  // By id; nullptr: there is none, or no more.
+  Body *body(uint64_t id) const;
+  Obstacle *obstacle(uint64_t id) const;
+  uint64_t handle_of(uint64_t id) const;  // body or obstacle; 0 if gone
 };
 
 // What the host has set for all of them.
@@ -183,36 +191,31 @@ struct Derived {
   bool revalued = false;  // values_changed(): tables stay valid, the plan is checked
   Plan plan;
   PairTables pairs;
-  double offset = 0;  // d_c, m
+  double offset = 0;        // d_c, m
+  uint64_t placements = 0;  // increases when positions or d_c change other than by a step
+  uint32_t sleepers = 0;    // bodies that sleep
 };
 
 struct World : WorldMemory, WorldState, Entities, Rules, Derived {
   uint64_t handle = 0;
-  // s: the time of keys of motions at the end of the next h. It lags behind the clock by the motion that the
-  // guard has removed, so that nothing has to catch up at a speed that nobody has prescribed.
-  double motion_time(double h) const { return prescribed.at(time + h) - stats.guard_lost; }
   std::vector<Sensed> sensed;  // at the end of the last step
   Overlaps overlaps;
-  uint64_t placements = 0;  // increases when positions or d_c change other than by a step
   WorldBound bound;
   IntegratorTimes integrator_times;
   std::atomic<bool> busy{false};       // a call of the API changes it (api/call.h)
   std::unique_ptr<StepContext> steps;  // buffers: step/context.h
   StepImpulses step_impulses;
-  uint32_t sleepers = 0;
   std::unique_ptr<Background> background;  // null: nothing has been made beside the steps
 
   explicit World(dfm_context *c);
   ~World();
   const Memory &memory() const { return meters.bodies.memory(); }
-
-  // world.cpp
-  Body *find_body(const std::string &name);
-  Obstacle *find_obstacle(const std::string &name);
-  // By id; nullptr: there is none, or no more.
-  Body *body(uint64_t id) const;
-  Obstacle *obstacle(uint64_t id) const;
-  uint64_t handle_of(uint64_t id) const;  // body or obstacle; 0 if gone
 };
+
+// s: the time of keys of motions at the end of the next h. It lags behind the clock by the motion that the
+// guard has removed, so that nothing has to catch up at a speed that nobody has prescribed.
+inline double motion_time(const WorldState &s, const Rules &r, double h) {
+  return r.prescribed.at(s.time + h) - s.stats.guard_lost;
+}
 
 }  // namespace dfm

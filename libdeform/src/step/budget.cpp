@@ -70,31 +70,33 @@ constexpr uint64_t kDefaultChecks = 2, kMinChecks = 1;
 // A stable step is evaluated as fast as this share of the points and cells moves.
 constexpr double kBoundShareOfWork = 0.5;
 
-uint64_t checks(const World &w, const StepContext &step, uint64_t number) {
-  return w.plan.has(StageRole::guards) ? number * surface_work(w, step) : 0;
+uint64_t checks(const Entities &entities, const Derived &derived, const Awake &awake, uint64_t number) {
+  return derived.plan.has(StageRole::guards) ? number * surface_work(entities, awake) : 0;
 }
 
-// What a sub-step needs that has as many contacts as the last one.
-uint64_t sub_step_work(const World &w, const StepContext &step, uint64_t number, uint64_t solve) {
-  return 1 + body_work(w, step) + surface_work(w, step) + checks(w, step, number) + solve * step.budget.rows;
+// What a sub-step needs that has as many contacts as the last one: with the default solve and checks, or with
+// the least.
+uint64_t sub_step_work(const Entities &entities, const Derived &derived, const Awake &awake, const Budget &b,
+                       uint64_t number = kDefaultChecks, uint64_t solve = kDefaultSolve) {
+  return 1 + body_work(entities, awake) + surface_work(entities, awake) +
+         checks(entities, derived, awake, number) + solve * b.rows;
 }
 uint64_t default_work(const World &w, const StepContext &step) {
-  return sub_step_work(w, step, kDefaultChecks, kDefaultSolve);
+  return sub_step_work(w, w, step, step.budget);
 }
 uint64_t min_work(const World &w, const StepContext &step) {
-  return sub_step_work(w, step, kMinChecks, kMinSolve);
+  return sub_step_work(w, w, step, step.budget, kMinChecks, kMinSolve);
 }
 
 uint64_t substeps_to_come(const StepContext &step) {
   return uint64_t{step.budget.to_come} + (step.h < step.rest);
 }
 
-bool holds(StepContext &step, uint64_t units) {
-  const Budget &b = step.budget;
+bool holds(Budget &b, uint64_t units) {
   const bool is_left =
       b.divided ? b.work + units <= b.limit : !(double(b.work) > kNoCutsAt * double(b.limit));
   if (is_left && !(used_time(b) > kNoCutsAt)) return true;
-  step.budget.cheapened = true;
+  b.cheapened = true;
   return false;
 }
 
@@ -209,18 +211,18 @@ void return_to_start(World &w, StepContext &step) {
 
 }  // namespace
 
-uint64_t body_work(const World &w, const StepContext &step) {
+uint64_t body_work(const Entities &entities, const Awake &awake) {
   uint64_t sum = 1;
-  for (const uint32_t i : step.active) {
-    const Body &b = *w.bodies[i];
+  for (const uint32_t i : awake.active) {
+    const Body &b = *entities.bodies[i];
     sum += b.dynamics->abilities().work * (b.p.n + b.tets.size() / 4);
   }
   return sum;
 }
 
-uint64_t surface_work(const World &w, const StepContext &step) {
+uint64_t surface_work(const Entities &entities, const Awake &awake) {
   uint64_t sum = 1;
-  for (const uint32_t i : step.active) sum += w.bodies[i]->surface.nsurfel;
+  for (const uint32_t i : awake.active) sum += entities.bodies[i]->surface.nsurfel;
   return sum;
 }
 
@@ -265,7 +267,7 @@ void share_work(const World &w, StepContext &step) {
     return;
   }
   const auto left_by = [&](uint64_t kept) { return b.limit > b.work + kept ? b.limit - b.work - kept : 0; };
-  const uint64_t own = b.other_work + checks(w, step, kDefaultChecks) + kEndOfSolve * b.rows;
+  const uint64_t own = b.other_work + checks(w, w, step, kDefaultChecks) + kEndOfSolve * b.rows;
   // a budget that does not hold all sub-steps ends the step before its end
   const uint64_t standard = default_work(w, step),
                  follow = std::min(substeps_to_come(step), left_by(own) / standard);
@@ -274,24 +276,24 @@ void share_work(const World &w, StepContext &step) {
   b.solve_end = b.work + uint64_t(kSolveShare * share);
 }
 
-bool may_repeat(const World &w, StepContext &step) {
-  return holds(step, step.budget.other_work + (2 + uint64_t{step.budget.to_come}) * default_work(w, step));
+bool may_repeat(const Entities &entities, const Derived &derived, const Awake &awake, Budget &b) {
+  return holds(b, b.other_work + (2 + uint64_t{b.to_come}) * sub_step_work(entities, derived, awake, b));
 }
 
 bool may_refine(const World &w, StepContext &step, double finer) {
   const uint64_t remaining = (1 + uint64_t{step.budget.to_come}) * uint64_t(finer);
-  return holds(step, step.budget.other_work + remaining * default_work(w, step));
+  return holds(step.budget, step.budget.other_work + remaining * default_work(w, step));
 }
 
 bool may_solve_again(const World &w, StepContext &step, size_t hits) {
   const Budget &b = step.budget;
-  return holds(step, b.other_work + substeps_to_come(step) * default_work(w, step) +
-                         checks(w, step, 1 + kDefaultChecks) + kDefaultSolve * (b.rows + hits));
+  return holds(step.budget, b.other_work + substeps_to_come(step) * default_work(w, step) +
+                                checks(w, w, step, 1 + kDefaultChecks) + kDefaultSolve * (b.rows + hits));
 }
 
 bool may_check(const World &w, StepContext &step) {
   return !step.budget.divided ||
-         holds(step, substeps_to_come(step) * default_work(w, step) + checks(w, step, 1));
+         holds(step.budget, substeps_to_come(step) * default_work(w, step) + checks(w, w, step, 1));
 }
 
 void spend(const World &w, const StepContext &, Spent &spent, uint64_t units) {

@@ -12,6 +12,9 @@
 namespace dfm {
 
 struct StepContext;
+struct Awake;
+struct Derived;
+struct Entities;
 struct World;
 
 struct Budget {
@@ -67,12 +70,12 @@ void spend(const World &w, const StepContext &step, Spent &spent, uint64_t units
 bool solve_ends(const StepContext &step, Spent &spent);
 void charge(World &w, StepContext &step, const Spent &spent);  // after all islands, by the stepping thread
 // Units of one pass over the bodies that are awake: points and cells; surfels.
-uint64_t body_work(const World &w, const StepContext &step);
-uint64_t surface_work(const World &w, const StepContext &step);
+uint64_t body_work(const Entities &entities, const Awake &awake);
+uint64_t surface_work(const Entities &entities, const Awake &awake);
 // Whether the budget holds these, beside the least work of what follows. If not, the step has left something
 // out: the present sub-step repeated as a shorter piece; as one of `finer` for each that is planned; its
 // contact solve repeated; another check by the guard.
-bool may_repeat(const World &w, StepContext &step);
+bool may_repeat(const Entities &entities, const Derived &derived, const Awake &awake, Budget &budget);
 bool may_refine(const World &w, StepContext &step, double finer);
 bool may_solve_again(const World &w, StepContext &step, size_t hits);
 bool may_check(const World &w, StepContext &step);

@@ -17,7 +17,7 @@ inline constexpr uint32_t kOnThisThread = ~0u;  // no points are
 // How many of the active bodies a block has. Explicit bodies of few points, less than `worth` in all, are no
 // work for two threads. Otherwise each body is a block, so that in all stages the same threads have the same
 // bodies.
-inline uint32_t bodies_together(const World &w, std::span<const uint32_t> active, uint32_t worth) {
+inline uint32_t bodies_together(const Entities &w, std::span<const uint32_t> active, uint32_t worth) {
   if (worth == kOnThisThread) return static_cast<uint32_t>(active.size());
   uint32_t points = 0;
   for (const uint32_t i : active) {
@@ -31,9 +31,10 @@ inline uint32_t bodies_together(const World &w, std::span<const uint32_t> active
 // act(body) -> has it succeeded? The active bodies side by side. Returns the first, in id order, for which it
 // has not, or null.
 template <class Act>
-const Body *each_active(const World &w, std::span<const uint32_t> active, uint32_t worth, const Act &act) {
+const Body *each_active(const WorldMemory &memory, const Entities &w, std::span<const uint32_t> active,
+                        uint32_t worth, const Act &act) {
   std::atomic<uint32_t> failed{kNone};
-  each_on(&w.context->tasks, active.size(), bodies_together(w, active, worth), [&](size_t k) {
+  each_on(&memory.context->tasks, active.size(), bodies_together(w, active, worth), [&](size_t k) {
     Body &b = *w.bodies[active[k]];
     const OnBehalf prefix(b.name);
     if (act(b)) return;

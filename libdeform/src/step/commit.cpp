@@ -35,7 +35,7 @@ constexpr double kAlong = 0.1;  // of the stable step: a way on which strains ch
 void damp_changes_of_size(World &w, const StepContext &step) {
   const double stable = w.bound.step / kBoundShare, c = next_damping(w.sizes, step.length.planned, stable);
   if (!(c > 0)) return;
-  each_active(w, step.active, kPointsToPull, [&](Body &b) {
+  each_active(w, w, step.active, kPointsToPull, [&](Body &b) {
     if (b.dynamics->unknowns().diagonal) b.dynamics->damp(w.time + step.h, c, kAlong * stable);
     return true;
   });
@@ -43,11 +43,11 @@ void damp_changes_of_size(World &w, const StepContext &step) {
 }  // namespace
 
 bool find_ends(World &w, StepContext &step, uint32_t *trouble) {
-  const SubStep now = sub_step_of(w, step);
+  const SubStep now = sub_step_of(w, w, step);
   const bool touched = has_impulses(w, step);
   const bool guarded = w.plan.has(StageRole::guards);
   if (guarded) step.guard.common.assign(w.bodies.size(), {});
-  const Body *const failed = each_active(w, step.active, kPointsToMove, [&](Body &b) {
+  const Body *const failed = each_active(w, w, step.active, kPointsToMove, [&](Body &b) {
     if (guarded) check_motion(w, step, b.slot);
     return b.dynamics->end_state(now, b.surfel_impulse.data(), touched);
   });
@@ -63,7 +63,7 @@ bool stage_commit(World &w, StepContext &step, uint32_t *trouble) {
   if (!step.ended && !find_ends(w, step, trouble)) return false;
   step.in_impact = has_impact(w, step);
   if (step.in_impact) return false;
-  const SubStep now = sub_step_of(w, step);
+  const SubStep now = sub_step_of(w, w, step);
   SubStep moved = now;
   moved.h *= step.guard.motion;
   if (step.guard.motion < 1) {
@@ -82,7 +82,7 @@ bool stage_commit(World &w, StepContext &step, uint32_t *trouble) {
   for (const uint32_t i : step.active)
     accurate = std::min(accurate, w.bodies[i]->dynamics->accurate_step(now));
   w.sizes.accurate = std::isfinite(accurate) ? accurate : 0;
-  each_active(w, step.active, kPointsToMove, [&](Body &b) {
+  each_active(w, w, step.active, kPointsToMove, [&](Body &b) {
     ready_change_work(b, now);
     b.dynamics->commit(moved);
     if (reads_points(w, b)) b.dynamics->see_points();

@@ -6,21 +6,27 @@
 
 namespace dfm {
 
+Views::Views() = default;
+Views::~Views() = default;
+
+Solution::Solution(const Memory &memory)
+    : contact_memory(memory),
+      rows(memory),
+      solve_islands(std::make_unique<SolveIslands>(memory)),
+      areas(memory),
+      exchange(memory),
+      renewal(memory) {}
+Solution::~Solution() = default;
+
 StepContext::StepContext(const Meters &meters)
-    : stage_times(stage_table().size()),
-      broad(meters.detection.memory()),
-      narrow(meters.detection.memory()),
-      contact_memory(meters.contacts.memory()),
-      rows(meters.contacts.memory()),
-      solve_islands(std::make_unique<SolveIslands>(meters.contacts.memory())),
-      tools(std::make_unique<ToolTouch>(meters.contacts.memory())),
-      areas(meters.contacts.memory()),
-      exchange(meters.contacts.memory()),
-      renewal(meters.contacts.memory()),
-      next_store(meters.contacts.memory()),
-      islands(meters.steps.memory()) {
-  use_memory(meters.steps.memory(), driven, free_kinetic, samples, in_full, near, touching, active, woken,
-             stirred, roused.bodies, roused.dwell, roused.total);
+    : Detection(meters.detection.memory()),
+      Solution(meters.contacts.memory()),
+      SubStepEnd(meters.contacts.memory()),
+      Awake(meters.steps.memory()),
+      stage_times(stage_table().size()) {
+  tools = std::make_unique<ToolTouch>(meters.contacts.memory());
+  use_memory(meters.steps.memory(), driven, free_kinetic, samples, in_full, near, touching, active, met,
+             woken, stirred, roused.bodies, roused.dwell, roused.total);
   use_memory(meters.contacts.memory(), lent, contacts, tolerance.normal, tolerance.tangent, start_residual,
              impulse_before_rebuild, tangents, slip_back, stick_drift, match, sharing, target_area,
              keeps_area, ways, renewed, rebound_speed, motions, marked, bonds, bond_impulse, chosen, mean,

@@ -43,16 +43,16 @@ struct StageTime {
   uint64_t calls = 0;
 };
 
-struct StepContext {
+// Lengths of the present sub-step.
+struct SubStepTimes {
   // s: length of the sub-step; from its start to the end of the step, and of the planned sub-step
   double h = 0, left = 0, rest = 0;
   StepLength length;
-  Budget budget;
-  double offered = 0;                  // s, length of the step if the library has chosen it, else 0
-  bool in_impact = false;              // the sub-step is to be repeated explicitly (step/impact.h)
-  std::vector<StageTime> stage_times;  // by row of the table
+  double offered = 0;  // s, length of the step if the library has chosen it, else 0
+};
 
-  // prepare(): the world's entities as the stages see them
+// prepare(): the world's entities as the stages see them
+struct Views {
   SceneFacts facts;  // what the plan was made from
   // how often prepare() has rebuilt these, and the plan
   struct { uint64_t tables = 0, plans = 0; } made;
@@ -65,8 +65,13 @@ struct StepContext {
   std::vector<DofSource> sources;
   std::vector<ImplicitSystem *> systems;               // by body slot; null: not implicit
   std::vector<std::unique_ptr<SelfBody>> self_bodies;  // in id order; those that may touch themselves
+  std::unique_ptr<ToolTouch> tools;                    // rigid things with each other
+  Views();
+  ~Views();
+};
 
-  // motion
+// motion, model, predict
+struct FreeMotions {
   struct Motion {
     Extent place, velocity;  // m, m/s, of its surfels
     double edge;             // m
@@ -74,20 +79,26 @@ struct StepContext {
   std::vector<Motion> surface_motions;  // [bodies] of contact_step()
   std::vector<uint32_t> triangles;      // near one of them
   Array<Driven> driven;
-  // predict
   Array<double> free_kinetic;   // [bodies] J, without contact; of this sub-step
   Array<EnergySample> samples;  // [active]
   // [bodies] where the guard takes a part of the motion: contact and forces act in full
   // (take_part_of_contact)
   Array<uint8_t> in_full;
   bool acts_in_full(uint32_t slot) const { return slot < in_full.size() && in_full[slot]; }
-  // broad, narrow, self
+};
+
+// broad, narrow, self contact
+struct Detection {
   BroadPhase broad;
   Array<ContactPoint> contacts;
   Array<uint8_t> lent;  // scratch of the narrow phase
   NarrowBlocks narrow;
+  Guard guard;  // what it knows of pairs serves the narrow phase
+  explicit Detection(const Memory &memory) : broad(memory), narrow(memory) {}
+};
 
-  // contact <-> friction
+// contact+friction
+struct Solution {
   const Memory &contact_memory;
   ContactRows rows;
   Array<Bond> bonds;
@@ -116,10 +127,9 @@ struct StepContext {
     double scale;  // of friction
     Vec3 belt;     // m/s
   };
-  Array<Chosen> chosen;              // [contacts] by the host (PreSolve); empty without a callback
-  Array<uint8_t> near;               // [bodies] had contacts in the last sub-step
-  Array<uint8_t> touching;           // [bodies] touch something, between steps
-  std::unique_ptr<ToolTouch> tools;  // with each other
+  Array<Chosen> chosen;     // [contacts] by the host (PreSolve); empty without a callback
+  Array<uint8_t> near;      // [bodies] had contacts in the last sub-step
+  Array<uint8_t> touching;  // [bodies] touch something, between steps
   // a rigid host, or rows between rigid things, have changed their motion: the solve goes on from its last
   // impulses
   bool rigid_again = false;
@@ -134,25 +144,38 @@ struct StepContext {
   Array<uint8_t> keeps_area;  // [contacts] is loaded, and keeps its area
   Array<Renewal::Way> ways;
   Array<double> renewed;
+  explicit Solution(const Memory &memory);
+  ~Solution();
+};
 
-  // distribute, guard
+// distribute, guard, commit
+struct SubStepEnd {
   std::vector<ImpulseSink> sinks;
   WrittenNodes given;
-  bool ended = false;  // find_ends() has been called since the last solve
-  Guard guard;
-  // commit
-  Array<double> mean;     // [dofs of rows,4] m/s, over the sub-step; of bodies
-  Array<uint8_t> before;  // [contacts] touched in the last sub-step
+  bool ended = false;      // find_ends() has been called since the last solve
+  bool in_impact = false;  // the sub-step is to be repeated explicitly (step/impact.h)
+  Array<double> mean;      // [dofs of rows,4] m/s, over the sub-step; of bodies
+  Array<uint8_t> before;   // [contacts] touched in the last sub-step
   // [contacts of the store] number of the contact that goes on from it, or kNone
   Array<uint32_t> goes_on;
-  // trades places with the world's
-  ContactStore next_store;
-  // sleep. If no body sleeps, `active` contains all bodies.
+  ContactStore next_store;  // trades places with the world's
+  explicit SubStepEnd(const Memory &memory) : next_store(memory) {}
+};
+
+// sleep. If no body sleeps, `active` contains all bodies.
+struct Awake {
   Islands islands;
-  // slots of active bodies, ascending; slots woken in this sub-step
-  Array<uint32_t> active, woken;
+  // slots of active bodies, ascending; of sleeping ones that contacts meet; of those that have woken
+  Array<uint32_t> active, met, woken;
   Roused roused;
   Array<uint8_t> stirred;  // [island]
+  explicit Awake(const Memory &memory) : islands(memory) {}
+};
+
+// A stage takes the parts that it reads and writes (step/step.cpp: part).
+struct StepContext : SubStepTimes, Views, FreeMotions, Detection, Solution, SubStepEnd, Awake {
+  Budget budget;
+  std::vector<StageTime> stage_times;  // by row of the table
 
   explicit StepContext(const Meters &meters);
   ~StepContext();

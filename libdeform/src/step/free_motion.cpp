@@ -13,10 +13,11 @@
 
 namespace dfm {
 
-SubStep sub_step_of(const World &w, const StepContext &step) {
+SubStep sub_step_of(const WorldState &state, const Rules &rules, const SubStepTimes &times) {
+  const Gravity &gravity = rules.gravity;
   const Vec3 before =
-      w.gravity.keys.empty() ? w.gravity.now : vector_at(w.gravity.keys, w.prescribed.at(w.time));
-  return {w.time, step.h, w.gravity.now, kLight, before};
+      gravity.keys.empty() ? gravity.now : vector_at(gravity.keys, rules.prescribed.at(state.time));
+  return {state.time, times.h, gravity.now, kLight, before};
 }
 
 void begin_bodies(World &w, StepContext &step) {
@@ -33,25 +34,29 @@ void begin_bodies(World &w, StepContext &step) {
 namespace {
 // From this number of cells on models divide their work among all threads themselves.
 constexpr size_t kLargeBody = 10000;
-bool fewer_than_threads_and_large(const World &w, std::span<const uint32_t> active) {
-  return active.size() < w.context->tasks.threads() &&
-         std::ranges::all_of(active, [&](uint32_t i) { return w.bodies[i]->tets.size() >= 4 * kLargeBody; });
+bool fewer_than_threads_and_large(const WorldMemory &memory, const Entities &entities,
+                                  std::span<const uint32_t> active) {
+  return active.size() < memory.context->tasks.threads() &&
+         std::ranges::all_of(
+             active, [&](uint32_t i) { return entities.bodies[i]->tets.size() >= 4 * kLargeBody; });
 }
 }  // namespace
 
-bool stage_model(World &w, StepContext &step, uint32_t *trouble) {
-  const SubStep now = sub_step_of(w, step);
+bool stage_model(const WorldMemory &memory, const WorldState &state, const Entities &entities,
+                 const Rules &rules, const SubStepTimes &times, const Awake &awake, uint32_t *trouble) {
+  const SubStep now = sub_step_of(state, rules, times);
   const auto forces = [&](Body &b) {
     // booked with them: work of what holds driven points, and what another size of sub-steps changes
-    const bool keep = !b.motions.empty() || w.watch.size_before > 0;
+    const bool keep = !b.motions.empty() || state.watch.size_before > 0;
     return b.dynamics->add_forces(now, keep);
   };
-  const uint32_t together = fewer_than_threads_and_large(w, step.active) ? kOnThisThread : kPointsToPull;
-  const Body *const failed = each_active(w, step.active, together, forces);
+  const uint32_t together =
+      fewer_than_threads_and_large(memory, entities, awake.active) ? kOnThisThread : kPointsToPull;
+  const Body *const failed = each_active(memory, entities, awake.active, together, forces);
   if (!failed) return true;
   return fail_step(trouble, DFM_TROUBLE_PLUGIN,
                    "%s: model '%s' could not compute its forces; take a smaller step or change the model",
-                   at_step(w, *failed).c_str(), failed->model.type->id);
+                   at_step(state, *failed).c_str(), failed->model.type->id);
 }
 
 namespace {
@@ -64,11 +69,13 @@ std::string reason_of(const Body &b, const SubStep &now) {
 }
 }  // namespace
 
-bool stage_predict(World &w, StepContext &step, uint32_t *trouble) {
-  const SubStep now = sub_step_of(w, step);
-  const bool touches = w.plan.touches();
-  const Body *const failed = each_active(w, step.active, kPointsToMove, [&](Body &b) {
-    const bool moved = b.dynamics->free_motion(now, step.free_kinetic[b.slot]);
+bool stage_predict(const WorldMemory &memory, const WorldState &state, const Entities &entities,
+                   const Rules &rules, const Derived &derived, const SubStepTimes &times, const Awake &awake,
+                   FreeMotions &motions, uint32_t *trouble) {
+  const SubStep now = sub_step_of(state, rules, times);
+  const bool touches = derived.plan.touches();
+  const Body *const failed = each_active(memory, entities, awake.active, kPointsToMove, [&](Body &b) {
+    const bool moved = b.dynamics->free_motion(now, motions.free_kinetic[b.slot]);
     if (touches && b.surface.identity())
       gather_surface(b.surface, b.p.x.data(), b.dynamics->unknowns().of_points());
     return moved;
@@ -76,7 +83,7 @@ bool stage_predict(World &w, StepContext &step, uint32_t *trouble) {
   if (!failed) return true;
   const Body &b = *failed;
   if (const std::string why = reason_of(b, now); !why.empty())
-    return fail_step(trouble, DFM_TROUBLE_PLUGIN, "%s: %s", at_step(w, b).c_str(), why.c_str());
+    return fail_step(trouble, DFM_TROUBLE_PLUGIN, "%s: %s", at_step(state, b).c_str(), why.c_str());
   const Unknowns unknowns = b.dynamics->unknowns();
   const size_t n = unknowns.of_points() ? b.p.n : b.surface.nsurfel;
   const double speed = largest_coordinate(unknowns.velocity, n, kStride);
@@ -88,31 +95,30 @@ bool stage_predict(World &w, StepContext &step, uint32_t *trouble) {
   return fail_step(
       trouble, DFM_TROUBLE_NONFINITE,
       "%s: %s (model '%s'); take a smaller step, or look for loads and parameters that are too large",
-      at_step(w, b).c_str(), what.c_str(), b.model.type->id);
+      at_step(state, b).c_str(), what.c_str(), b.model.type->id);
 }
 
 // Surfels coupled to several phyxels: rows of N are independent, so they are divided among the threads.
-bool stage_gather(World &w, StepContext &step, uint32_t *) {
-  for (const uint32_t i : step.active) {
-    const auto &b = w.bodies[i];
+void stage_gather(const WorldMemory &memory, const Entities &entities, const Awake &awake) {
+  for (const uint32_t i : awake.active) {
+    const auto &b = entities.bodies[i];
     if (b->surface.identity()) continue;
     const double *const v = b->dynamics->unknowns().of_points();
-    w.context->tasks.parallel_for(b->surface.nsurfel, 1024, [&](uint32_t begin, uint32_t end) {
+    memory.context->tasks.parallel_for(b->surface.nsurfel, 1024, [&](uint32_t begin, uint32_t end) {
       gather_rows(b->surface, b->p.x.data(), v, begin, end);
     });
   }
-  return true;
 }
 
-bool stage_broad(World &w, StepContext &step, uint32_t *) {
+void stage_broad(const WorldMemory &memory, const Derived &derived, const SubStepTimes &times,
+                 const Views &views, Detection &detection) {
   try {
-    step.broad.update(step.body_views, step.obstacle_views, w.pairs.filter, step.h, w.offset,
-                      &w.context->tasks);
+    detection.broad.update(views.body_views, views.obstacle_views, derived.pairs.filter, times.h,
+                           derived.offset, &memory.context->tasks);
   } catch (...) {
-    step.broad.clear();  // out of memory while making its lists: they are rebuilt next time
+    detection.broad.clear();  // out of memory while making its lists: they are rebuilt next time
     throw;
   }
-  return true;
 }
 
 }  // namespace dfm

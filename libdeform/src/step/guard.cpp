@@ -176,7 +176,8 @@ bool withstands_impacts(World &w, StepContext &step) {
   // impacts divide what is planned, gains any piece of it
   const bool whole = step.h == step.length.planned && step.length.parts == 1;
   const auto fits = [&](double parts) {
-    return whole ? parts <= step.length.most_parts && may_refine(w, step, parts) : may_repeat(w, step);
+    return whole ? parts <= step.length.most_parts && may_refine(w, step, parts)
+                 : may_repeat(w, w, step, step.budget);
   };
   double parts = 1;
   while (gain > kGains * (parts * parts) * (parts * parts) &&
@@ -195,7 +196,7 @@ void follow_ends(World &w, StepContext &step) {
   if (w.plan.has(StageRole::lists_pairs))
     step.broad.cover(step.body_views, step.obstacle_views, w.pairs.filter, step.h, w.offset, step.guard.speed,
                      &w.context->tasks);
-  follow_pairs(w, step, cover_self(w, step));
+  follow_pairs(w, w, step, step, cover_self(w, step));
 }
 
 void make_room(GuardSide &s, const Surface &surface) {
@@ -323,14 +324,15 @@ bool are_parts(const StepContext &step, const Candidate &c) {
   return a.whole && a.whole == b.whole;
 }
 
-const Guard::Through &crossing(StepContext &step, uint32_t slot_a, uint32_t slot_b, bool obstacle) {
-  Guard &g = step.guard;
+const Guard::Through &crossing(const Views &views, Detection &detection, uint32_t slot_a, uint32_t slot_b,
+                               bool obstacle) {
+  Guard &g = detection.guard;
   for (const Guard::Through &t : g.through)
     if (t.a == slot_a && t.b == slot_b && t.obstacle == obstacle) return t;
   Guard::Through found{slot_a, slot_b, obstacle, {}};
-  const Surface &a = *step.body_views[slot_a].surface;
-  const Surface &b = obstacle ? *step.obstacle_views[slot_b].surface : *step.body_views[slot_b].surface;
-  step.broad.near_triangles_of(slot_a, slot_b, obstacle, [&](uint32_t s, uint32_t t) {
+  const Surface &a = *views.body_views[slot_a].surface;
+  const Surface &b = obstacle ? *views.obstacle_views[slot_b].surface : *views.body_views[slot_b].surface;
+  detection.broad.near_triangles_of(slot_a, slot_b, obstacle, [&](uint32_t s, uint32_t t) {
     if (triangles_cross(a, s, b, t)) found.triangles.push_back({s, t});
   });
   return g.through.emplace_back(std::move(found));
@@ -341,7 +343,7 @@ const Guard::Through &crossing(StepContext &step, uint32_t slot_a, uint32_t slot
 bool cross_at_start(StepContext &step, const Candidate &c) {
   const bool swap = !c.obstacle && c.slot_b < c.slot_a;
   const uint32_t low = swap ? c.slot_b : c.slot_a, high = swap ? c.slot_a : c.slot_b;
-  const auto &crossed = crossing(step, low, high, c.obstacle).triangles;
+  const auto &crossed = crossing(step, step, low, high, c.obstacle).triangles;
   if (c.obstacle || !are_parts(step, c)) return !crossed.empty();
   const auto has = [&](uint32_t slot, uint32_t t, int kind, uint32_t feature) {
     const Surface &s = *step.body_views[slot].surface;
@@ -398,7 +400,7 @@ bool wake_hit(World &w, StepContext &step) {
 bool jammed(const World &w, const StepContext &step) {
   if (!(step.guard.motion < kNoWay && step.h > 0.5 * step.length.planned && step.residual.required > 1))
     return false;
-  return !step.budget.cuts_solves() && has_prescribed_motion(w, step);
+  return !step.budget.cuts_solves() && has_prescribed_motion(w, step, step);
 }
 
 // The fraction of the way that leaves no hit, by checks as far as the budget holds them; else none. safe: the
@@ -417,31 +419,34 @@ void take_safe_part(World &w, StepContext &step, bool lets_slits, double safe) {
 
 }  // namespace
 
-bool cross_at_start(StepContext &step, uint32_t slot_a, uint32_t slot_b, bool obstacle) {
-  return !crossing(step, slot_a, slot_b, obstacle).triangles.empty();
+bool cross_at_start(const Views &views, Detection &detection, uint32_t slot_a, uint32_t slot_b,
+                    bool obstacle) {
+  return !crossing(views, detection, slot_a, slot_b, obstacle).triangles.empty();
 }
 
-bool has_prescribed_motion(const World &w, const StepContext &step) {
+bool has_prescribed_motion(const Entities &entities, const Views &views, const FreeMotions &motions) {
   const auto prescribed = [&](const Obstacle &o) {
-    return !o.rigid || std::ranges::any_of(
-                           w.tools, [&](const auto &t) { return t->set == o.rigid && !t->motion.coupled(); });
+    return !o.rigid || std::ranges::any_of(entities.tools, [&](const auto &t) {
+      return t->set == o.rigid && !t->motion.coupled();
+    });
   };
-  return !step.driven.empty() || std::ranges::any_of(w.obstacles, [&](const auto &o) {
-    return step.obstacle_views[o->slot].moves() && prescribed(*o);
+  return !motions.driven.empty() || std::ranges::any_of(entities.obstacles, [&](const auto &o) {
+    return views.obstacle_views[o->slot].moves() && prescribed(*o);
   });
 }
 
-void follow_pairs(World &w, StepContext &step, bool fresh) {
-  Guard &g = step.guard;
-  if (std::exchange(g.placements, w.placements) != w.placements) g.forget();
-  const uint64_t renewals = step.broad.stats().renewals;
+void follow_pairs(const WorldMemory &memory, const Derived &derived, Views &views, Detection &detection,
+                  bool fresh) {
+  Guard &g = detection.guard;
+  if (std::exchange(g.placements, derived.placements) != derived.placements) g.forget();
+  const uint64_t renewals = detection.broad.stats().renewals;
   if (!fresh && !g.memory.runs.empty() && g.lists == renewals) return;
   g.lists = renewals;
-  const Array<Candidate> &pairs = step.broad.candidates();
+  const Array<Candidate> &pairs = detection.broad.candidates();
   try {
-    g.list =
-        join_self(step, w.plan.has(StageRole::lists_pairs) ? &pairs : nullptr, g.joined) ? &g.joined : &pairs;
-    g.memory.follow(*g.list, &w.context->tasks);
+    const bool listed = derived.plan.has(StageRole::lists_pairs);
+    g.list = join_self(views, listed ? &pairs : nullptr, g.joined) ? &g.joined : &pairs;
+    g.memory.follow(*g.list, &memory.context->tasks);
   } catch (...) {
     g.forget();  // out of memory: what is known is of no list
     throw;
@@ -475,13 +480,13 @@ Next stage_guard(World &w, StepContext &step, uint32_t *trouble) {
     guard_add_hits(w, step);
     for (const uint32_t i : step.active)
       if (Dynamics &d = *w.bodies[i]->dynamics; d.unknowns().diagonal)
-        d.end_state(sub_step_of(w, step), nullptr, false);
+        d.end_state(sub_step_of(w, w, step), nullptr, false);
     step.guard.resolving = true;
     ++step.guard.solves;
     ++w.stats.guard_solves;
     return Next::solve;
   }
-  if (step.guard.cuts < kCuts && may_repeat(w, step)) {
+  if (step.guard.cuts < kCuts && may_repeat(w, w, step, step.budget)) {
     ++step.guard.cuts;
     ++w.stats.guard_cuts;
     step.length.repeat(std::max(safe, kMinCut));
@@ -500,7 +505,7 @@ Next stage_guard(World &w, StepContext &step, uint32_t *trouble) {
     set_fraction(w, step, 1);
     take_safe_part(w, step, true, safe);
   }
-  if (jammed(w, step)) return go_on(report_jam(w, step, trouble));
+  if (jammed(w, step)) return go_on(report_jam(w, w, step, step, step, trouble));
   if (!withstands_impacts(w, step)) return Next::stop;
   return Next::stage;
 }

@@ -25,22 +25,25 @@ void reserve_contacts(World &w, StepContext &step) {
   step.mean.reserve(size_t{kStride} * step.rows.ndof);
   step.before.resize(n);
   step.goes_on.reserve(w.store.n);
-  reserve_reports(w, step);
+  reserve_reports(w, w, w, step, step, w.step_impulses);
 }
 
-void reserve_reports(World &w, const StepContext &step) {
-  const size_t rigid = step.tools->next_touching().size();
+void reserve_reports(WorldState &state, const Entities &entities, const Derived &derived, const Views &views,
+                     const Solution &solution, StepImpulses &impulses) {
+  const size_t rigid = views.tools->next_touching().size();
   size_t contacts = 0;
-  if (w.plan.touches()) contacts = step.rows.soft() + (w.sleepers ? size_t{w.store.n} : 0);
-  const size_t pairs = w.bodies.size() * (w.bodies.size() + w.obstacles.size());
-  w.work.reserve(w.work.size() + std::min(contacts, pairs) + rigid);
-  reserve_events(w, contacts + w.store.n + w.attachments.size() + rigid + w.rigid_touching.size());
-  reserve_impulses(w, contacts, rigid);
+  if (derived.plan.touches())
+    contacts = solution.rows.soft() + (derived.sleepers ? size_t{state.store.n} : 0);
+  const size_t pairs = entities.bodies.size() * (entities.bodies.size() + entities.obstacles.size());
+  state.work.reserve(state.work.size() + std::min(contacts, pairs) + rigid);
+  reserve_events(state,
+                 contacts + state.store.n + state.attachments.size() + rigid + state.rigid_touching.size());
+  reserve_impulses(impulses, state, pairs, contacts, rigid);
 }
 
-void reserve_events(World &w, size_t more) {
-  const size_t most = w.events.size() + more;
-  if (w.events.capacity() < most) w.events.reserve(2 * most);
+void reserve_events(WorldState &state, size_t more) {
+  const size_t most = state.events.size() + more;
+  if (state.events.capacity() < most) state.events.reserve(2 * most);
 }
 
 void add_event(World &w, uint32_t kind, uint64_t a, uint64_t b, uint64_t key, double t) {

@@ -31,38 +31,39 @@ void each_held_place(const Body &b, double t, const std::function<void(uint32_t,
   }
 }
 
-bool stage_motion(World &w, StepContext &step, uint32_t *) {
+void stage_motion(const WorldState &state, Entities &entities, Rules &rules, const SubStepTimes &times,
+                  FreeMotions &motions) {
   // Held velocities are the only state that changes before a sub-step has succeeded; the previous values are
   // kept.
-  const double end = w.prescribed.at(w.time + step.h);
-  if (!w.gravity.keys.empty()) change_gravity(w, vector_at(w.gravity.keys, end));
-  for (auto &b : w.bodies) {
+  const Prescribed &prescribed = rules.prescribed;
+  const double end = prescribed.at(state.time + times.h);
+  if (!rules.gravity.keys.empty()) change_gravity(state, entities, rules, vector_at(rules.gravity.keys, end));
+  for (auto &b : entities.bodies) {
     if (b->sleep_state.asleep) continue;
     if (b->loads_vary()) {
       const auto set = [&](double t) {
-        set_loads(*b, t, w.prescribed.share);
+        set_loads(*b, t, prescribed.share);
         for (const Spring &spring : b->springs) {
-          if (w.prescribed.is_static()) add_spring_force(*b, spring, end, 0);
-          else add_spring_force(*b, spring, w.time, step.h);
+          if (prescribed.is_static()) add_spring_force(*b, spring, end, 0);
+          else add_spring_force(*b, spring, state.time, times.h);
         }
       };
       if (b->dynamics->abilities().parts) {
-        set(w.prescribed.at(w.time));
+        set(prescribed.at(state.time));
         b->p.load_before = b->p.load;
       }
       set(end);
     }
-    each_held_place(*b, w.motion_time(step.rest), [&](uint32_t point, Vec3 to) {
+    each_held_place(*b, motion_time(state, rules, times.rest), [&](uint32_t point, Vec3 to) {
       const size_t at = size_t(point) * kStride;
-      const Vec3 v = (1 / step.rest) * (to - load3(&b->p.x[at]));
+      const Vec3 v = (1 / times.rest) * (to - load3(&b->p.x[at]));
       for (int k = 0; k < 3; ++k)
         if (b->p.held[point] & (1 << k)) {
-          step.driven.push_back({&b->p.v[at + size_t(k)], b->p.v[at + size_t(k)]});
+          motions.driven.push_back({&b->p.v[at + size_t(k)], b->p.v[at + size_t(k)]});
           b->p.v[at + size_t(k)] = v[k];
         }
     });
   }
-  return true;
 }
 
 void undo_motion(Array<Driven> &driven) {

@@ -272,26 +272,27 @@ void follow_list(SelfBody &s, double offset) {
   s.pairs.follow(s.body->surface, s.rest, s.list.renewals(), offset);
 }
 
-bool stage_self(World &w, StepContext &step, uint32_t *) {
-  if (!w.plan.has(StageRole::finds_contacts)) step.contacts.clear();
-  const bool listed = w.plan.has(StageRole::lists_pairs);  // that stage has computed the speeds
-  for (auto &s : step.self_bodies) {
-    const BodyView &view = step.body_views[s->body->slot];
+void stage_self(const Derived &derived, const SubStepTimes &times, Views &views, Detection &detection) {
+  const Plan &plan = derived.plan;
+  const double h = times.h, offset = derived.offset;
+  if (!plan.has(StageRole::finds_contacts)) detection.contacts.clear();
+  const bool listed = plan.has(StageRole::lists_pairs);  // that stage has computed the speeds
+  for (auto &s : views.self_bodies) {
+    const BodyView &view = views.body_views[s->body->slot];
     s->crosses.clear();
     if (view.asleep) continue;
     // copies of a point are nearer than they are set back
     const bool opened = s->rest.opened.any();
-    if (opened) s->list.update(step.h, w.offset);
-    s->on = opened || !s->list.far(step.h, w.offset, listed ? step.broad.speed(s->body->slot) : HUGE_VAL);
+    if (opened) s->list.update(h, offset);
+    s->on = opened || !s->list.far(h, offset, listed ? detection.broad.speed(s->body->slot) : HUGE_VAL);
     if (!s->on) continue;
-    s->pairs.within = s->list.within(step.h, w.offset);
+    s->pairs.within = s->list.within(h, offset);
     SelfBody *const self = s.get();
     const Tangled tangled = [self](uint32_t surfel) { return is_tangled(*self, surfel); };
-    follow_list(*s, w.offset);
-    find_self_contacts(view, s->rest, step.h, w.offset, w.plan.has(StageRole::guards) ? tangled : nullptr,
-                       s->pairs, step.lent, step.contacts);
+    follow_list(*s, offset);
+    find_self_contacts(view, s->rest, h, offset, plan.has(StageRole::guards) ? tangled : nullptr, s->pairs,
+                       detection.lent, detection.contacts);
   }
-  return true;
 }
 
 bool cover_self(World &w, StepContext &step) {
@@ -308,16 +309,16 @@ bool cover_self(World &w, StepContext &step) {
   return fresh;
 }
 
-bool join_self(StepContext &step, const Array<Candidate> *pairs, Array<Candidate> &to) {
-  if (std::none_of(step.self_bodies.begin(), step.self_bodies.end(), [](auto &s) { return s->on; })) {
-    for (auto &s : step.self_bodies) s->joined = 0;
+bool join_self(Views &views, const Array<Candidate> *pairs, Array<Candidate> &to) {
+  if (std::none_of(views.self_bodies.begin(), views.self_bodies.end(), [](auto &s) { return s->on; })) {
+    for (auto &s : views.self_bodies) s->joined = 0;
     if (pairs) return false;
     to.clear();  // what the broad phase lists is of an earlier plan, whose bodies may be gone
     return true;
   }
   to.clear();
   if (pairs) to.insert(to.end(), pairs->begin(), pairs->end());
-  for (auto &s : step.self_bodies) {
+  for (auto &s : views.self_bodies) {
     const uint32_t slot = s->body->slot;
     s->joined = 0;
     if (!s->on) continue;

@@ -8,9 +8,10 @@
 
 namespace dfm {
 
-struct StepContext;
-struct World;
 struct Body;
+struct StepContext;
+struct Views;
+struct World;
 
 struct SelfBody {
   uint64_t id, shape;  // the body's (state/body.h)
@@ -46,7 +47,7 @@ void choose_self_bodies(World &w, StepContext &step, SceneFacts &facts, std::vec
 bool cover_self(World &w, StepContext &step);
 // Fills `to` with `pairs` (null: none) and behind them those of bodies with themselves; false: there are
 // none, and `to` is as it was.
-bool join_self(StepContext &step, const Array<Candidate> *pairs, Array<Candidate> &to);
+bool join_self(Views &views, const Array<Candidate> *pairs, Array<Candidate> &to);
 // m that the two features of a candidate of one body rest apart; 0 where the guard has nothing to keep:
 // they lie on each other at rest, or cross at the start of the sub-step, and what is through already
 // must be let out.

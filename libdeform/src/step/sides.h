@@ -9,12 +9,12 @@
 
 namespace dfm {
 
-inline uint64_t id_of_b(const World &w, const ContactPoint &c) {
+inline uint64_t id_of_b(const Entities &w, const ContactPoint &c) {
   return c.obstacle ? w.obstacles[c.slot_b]->id : w.bodies[c.slot_b]->id;
 }
 
 // Whether lists of contacts have side b of the store as a: of two rigid things, if b alone gives way.
-bool b_first(const World &w, const ContactStore &s, uint32_t i);
+bool b_first(const Entities &w, const ContactStore &s, uint32_t i);
 // The sides as reports of pairs have them, by ids; of two bodies a is the older one. turned: the store has
 // the other one first.
 struct PairSides {

@@ -58,17 +58,17 @@ double rest_start(const Body &b) {
 
 // Bodies for which `counts` is true share an island with those to which they are attached.
 template <class Counts>
-void join_attached(World &w, Counts counts) {
-  for (const Attachment &a : w.attachments) {
-    const uint32_t i = slot_of(w, a.body), j = a.obstacle ? kNone : slot_of(w, a.to);
-    if (j != kNone && !a.released && counts(*w.bodies[i]) && counts(*w.bodies[j]))
-      w.steps->islands.join(i, j);
+void join_attached(const WorldState &state, const Entities &entities, Islands &islands, Counts counts) {
+  for (const Attachment &a : state.attachments) {
+    const uint32_t i = slot_of(entities, a.body), j = a.obstacle ? kNone : slot_of(entities, a.to);
+    if (j != kNone && !a.released && counts(*entities.bodies[i]) && counts(*entities.bodies[j]))
+      islands.join(i, j);
   }
 }
 
-bool asleep(const World &w, uint64_t id) {
-  const uint32_t i = slot_of(w, id);
-  return i != kNone && w.bodies[i]->sleep_state.asleep;
+bool asleep(const Entities &entities, uint64_t id) {
+  const uint32_t i = slot_of(entities, id);
+  return i != kNone && entities.bodies[i]->sleep_state.asleep;
 }
 
 }  // namespace
@@ -79,27 +79,28 @@ static uint32_t place_of(const List &list, uint64_t id) {
   const auto at = std::ranges::lower_bound(list, id, {}, [](const auto &x) { return x->id; });
   return at != list.end() && (*at)->id == id ? static_cast<uint32_t>(at - list.begin()) : kNone;
 }
-uint32_t slot_of(const World &w, uint64_t id) { return place_of(w.bodies, id); }
-uint32_t obstacle_slot_of(const World &w, uint64_t id) { return place_of(w.obstacles, id); }
+uint32_t slot_of(const Entities &e, uint64_t id) { return place_of(e.bodies, id); }
+uint32_t obstacle_slot_of(const Entities &e, uint64_t id) { return place_of(e.obstacles, id); }
 
 // Finds the active bodies of a sub-step, and the bodies that receive contact impulses.
-void gather_active(World &w) {
-  StepContext &step = *w.steps;
-  step.active.clear();
-  step.sinks.clear();
-  step.given.known = false;
-  for (uint32_t i = 0; i < w.bodies.size(); ++i) {
-    Body &b = *w.bodies[i];
-    step.body_views[i].asleep = b.sleep_state.asleep;
-    step.body_views[i].speed = b.sleep_state.asleep ? 0 : -1;
+void gather_active(Entities &entities, Derived &derived, Views &views, SubStepEnd &end, Awake &awake) {
+  awake.active.clear();
+  end.sinks.clear();
+  end.given.known = false;
+  for (uint32_t i = 0; i < entities.bodies.size(); ++i) {
+    Body &b = *entities.bodies[i];
+    BodyView &view = views.body_views[i];
+    view.asleep = b.sleep_state.asleep;
+    view.speed = b.sleep_state.asleep ? 0 : -1;
     if (b.sleep_state.asleep) continue;
-    step.active.push_back(i);
-    step.sinks.push_back({step.body_views[i].first_node, b.surface.nsurfel, b.p.n, &b.surface,
-                          b.surfel_impulse.data(),
-                          b.dynamics->unknowns().diagonal ? b.p.impulse.data() : nullptr});
+    awake.active.push_back(i);
+    end.sinks.push_back({view.first_node, b.surface.nsurfel, b.p.n, &b.surface, b.surfel_impulse.data(),
+                         b.dynamics->unknowns().diagonal ? b.p.impulse.data() : nullptr});
   }
-  w.sleepers = static_cast<uint32_t>(w.bodies.size() - step.active.size());
+  derived.sleepers = static_cast<uint32_t>(entities.bodies.size() - awake.active.size());
 }
+
+void gather_active(World &w) { gather_active(w, w, *w.steps, *w.steps, *w.steps); }
 
 void reserve_sleep(World &w, StepContext &step, uint32_t n) {
   if (w.def.sleep) {
@@ -167,7 +168,7 @@ void wake(World &w, Body &b) {
     if (i != kNone && j != kNone && w.bodies[i]->sleep_state.asleep && w.bodies[j]->sleep_state.asleep)
       step.islands.join(i, j);
   }
-  join_attached(w, [](const Body &x) { return x.sleep_state.asleep; });
+  join_attached(w, w, step.islands, [](const Body &x) { return x.sleep_state.asleep; });
   step.islands.finish();
   const uint32_t k = step.islands.of[slot_of(w, b.id)];
   rouse(w, {&step.islands.member[step.islands.begin[k]], step.islands.begin[k + 1] - step.islands.begin[k]});
@@ -196,68 +197,10 @@ bool all_idle(const World &w, const StepContext &step) {
                       [](const ObstacleView &o) { return o.moves(); });
 }
 
-// At the end of a sub-step that has been committed; allocates nothing.
-bool stage_sleep(World &w, StepContext &step, uint32_t *) {
-  const double end = w.time + step.h;
-  step.woken.clear();
-  bool tired = false;
-  for (const uint32_t i : step.active) {
-    Body &b = *w.bodies[i];
-    const Phyxels &p = b.p;
-    double &quiet_time = b.sleep_state.quiet_time;
-    if (!(largest_norm(p.n, p.v.data(), nullptr) < w.def.sleep_speed)) {
-      quiet_time = 0;
-    } else if (quiet_time > 0 && largest_norm(p.n, p.x.data(), b.anchor.data()) <= kStay * w.offset) {
-      quiet_time += step.h;
-    } else {
-      quiet_time = step.h;
-      std::copy(p.x.begin(), p.x.end(), b.anchor.begin());
-    }
-    tired |= b.sleep_state.quiet_time >= w.def.sleep_time;
-  }
-  if (!tired || end < last_time(w.gravity.keys)) return true;
+namespace {
 
-  const size_t n = w.plan.touches() ? step.contacts.size() : 0;
-  step.islands.start(static_cast<uint32_t>(w.bodies.size()));
-  for (size_t i = 0; i < n; ++i)
-    if (!step.contacts[i].obstacle) step.islands.join(step.contacts[i].slot_a, step.contacts[i].slot_b);
-  join_attached(w, [](const Body &b) { return !b.sleep_state.asleep; });
-  step.islands.finish();
-  step.stirred.assign(step.islands.count, 0);
-  const double creep = tangent_at_rest(w, step.h);
-  for (const uint32_t i : step.active) {
-    const Body &b = *w.bodies[i];
-    if (!(b.sleep_state.quiet_time >= w.def.sleep_time && rest_start(b) <= end) || has_dues(b))
-      step.stirred[step.islands.of[i]] = 1;
-  }
-  for (size_t i = 0; i < n; ++i) {
-    const ContactPoint &c = step.contacts[i];
-    const double *const l = &step.rows.impulse[3 * i];
-    // A contact at the edge of its cone may also be at rest: it slides if it is faster than the tolerance of
-    // a sticking contact.
-    const double s1 = step.state.vt[i], s2 = step.state.vt[step.state.stride + i];
-    const bool slides =
-        step.state.mode[i] != 1 && (l[1] != 0 || l[2] != 0) && s1 * s1 + s2 * s2 > creep * creep;
-    const bool pushed = c.obstacle && (w.obstacles[c.slot_b]->rigid || step.obstacle_views[c.slot_b].moves());
-    if (slides || pushed) step.stirred[step.islands.of[c.slot_a]] = 1;
-  }
-  for (const Attachment &a : w.attachments) {
-    if (!a.obstacle) continue;
-    const uint32_t slot = obstacle_slot_of(w, a.to);
-    if (w.obstacles[slot]->rigid || step.obstacle_views[slot].moves())
-      step.stirred[step.islands.of[slot_of(w, a.body)]] = 1;
-  }
-  bool any = false;
-  for (const uint32_t i : step.active)
-    if (!step.stirred[step.islands.of[i]]) {
-      fall_asleep(w, step, *w.bodies[i], end);
-      any = true;
-    }
-  if (any) gather_active(w);
-  return true;
-}
-
-void fall_asleep(World &w, StepContext &step, Body &b, double end) {
+// end: s, of the sub-step of length h
+void fall_asleep(WorldState &state, const Plan &plan, double end, double h, Body &b) {
   Phyxels &p = b.p;
   Vec3 momentum, impulse;
   double kinetic = 0;
@@ -266,17 +209,83 @@ void fall_asleep(World &w, StepContext &step, Body &b, double end) {
     momentum += p.mass[i] * v;
     kinetic += 0.5 * p.mass[i] * norm2(v);
   }
-  w.stats.sleep_energy += kinetic;
-  add3(w.stats.sleep_momentum, momentum);
+  state.stats.sleep_energy += kinetic;
+  add3(state.stats.sleep_momentum, momentum);
   std::fill(p.v.begin(), p.v.end(), 0.0);
   b.relax_dampers();
   std::fill(p.v_free.begin(), p.v_free.end(), 0.0);
   b.dynamics->points_changed();
   gather_surface(b.surface, p.x.data(), p.v.data());  // detection continues to see it at its place
-  if (w.plan.touches())
+  if (plan.touches())
     for (uint32_t s = 0; s < b.surface.nsurfel; ++s) impulse += load3(&b.surfel_impulse[3 * size_t(s)]);
-  b.sleep_state = {true, 0, end, step.h, (1 / step.h) * impulse};
+  b.sleep_state = {true, 0, end, h, (1 / h) * impulse};
   b.bound.known = false;
+}
+
+}  // namespace
+
+// At the end of a sub-step that has been committed; allocates nothing.
+void stage_sleep(WorldState &state, Entities &entities, const Rules &rules, Derived &derived,
+                 const SubStepTimes &times, const Detection &detection, const Solution &solution,
+                 Views &views, SubStepEnd &end, Awake &awake) {
+  const double now = state.time + times.h;
+  awake.woken.clear();
+  bool tired = false;
+  for (const uint32_t i : awake.active) {
+    Body &b = *entities.bodies[i];
+    const Phyxels &p = b.p;
+    double &quiet_time = b.sleep_state.quiet_time;
+    if (!(largest_norm(p.n, p.v.data(), nullptr) < rules.def.sleep_speed)) {
+      quiet_time = 0;
+    } else if (quiet_time > 0 && largest_norm(p.n, p.x.data(), b.anchor.data()) <= kStay * derived.offset) {
+      quiet_time += times.h;
+    } else {
+      quiet_time = times.h;
+      std::copy(p.x.begin(), p.x.end(), b.anchor.begin());
+    }
+    tired |= b.sleep_state.quiet_time >= rules.def.sleep_time;
+  }
+  if (!tired || now < last_time(rules.gravity.keys)) return;
+
+  const size_t n = derived.plan.touches() ? detection.contacts.size() : 0;
+  awake.islands.start(static_cast<uint32_t>(entities.bodies.size()));
+  for (size_t i = 0; i < n; ++i)
+    if (!detection.contacts[i].obstacle)
+      awake.islands.join(detection.contacts[i].slot_a, detection.contacts[i].slot_b);
+  join_attached(state, entities, awake.islands, [](const Body &b) { return !b.sleep_state.asleep; });
+  awake.islands.finish();
+  awake.stirred.assign(awake.islands.count, 0);
+  const double creep = tangent_at_rest(rules, derived, times.h);
+  for (const uint32_t i : awake.active) {
+    const Body &b = *entities.bodies[i];
+    if (!(b.sleep_state.quiet_time >= rules.def.sleep_time && rest_start(b) <= now) || has_dues(b))
+      awake.stirred[awake.islands.of[i]] = 1;
+  }
+  for (size_t i = 0; i < n; ++i) {
+    const ContactPoint &c = detection.contacts[i];
+    const double *const l = &solution.rows.impulse[3 * i];
+    // A contact at the edge of its cone may also be at rest: it slides if it is faster than the tolerance of
+    // a sticking contact.
+    const double s1 = solution.state.vt[i], s2 = solution.state.vt[solution.state.stride + i];
+    const bool slides =
+        solution.state.mode[i] != 1 && (l[1] != 0 || l[2] != 0) && s1 * s1 + s2 * s2 > creep * creep;
+    const bool pushed =
+        c.obstacle && (entities.obstacles[c.slot_b]->rigid || views.obstacle_views[c.slot_b].moves());
+    if (slides || pushed) awake.stirred[awake.islands.of[c.slot_a]] = 1;
+  }
+  for (const Attachment &a : state.attachments) {
+    if (!a.obstacle) continue;
+    const uint32_t slot = obstacle_slot_of(entities, a.to);
+    if (entities.obstacles[slot]->rigid || views.obstacle_views[slot].moves())
+      awake.stirred[awake.islands.of[slot_of(entities, a.body)]] = 1;
+  }
+  bool any = false;
+  for (const uint32_t i : awake.active)
+    if (!awake.stirred[awake.islands.of[i]]) {
+      fall_asleep(state, derived.plan, now, times.h, *entities.bodies[i]);
+      any = true;
+    }
+  if (any) gather_active(entities, derived, views, end, awake);
 }
 
 // Contacts of sleeping bodies are appended to those of this sub-step, in the order of their keys.

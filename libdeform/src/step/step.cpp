@@ -6,7 +6,7 @@
 //     pieces                         advance(), take_substep(): shorter where the guard requires it
 //       stages                       sub_step(): all rows of the table that the plan has chosen,
 //                                    or none
-//         Next::woken                narrow has found bodies that contacts wake: catch_up(), narrow again
+//         Next::woken                narrow has met bodies that sleep: catch_up(), narrow again
 //         Next::solve                rigid commit: a host requests another solve, or rigid things move
 //                                    otherwise than soft bodies know (rigid.cpp); guard: with the pairs that
 //                                    would cross (guard.cpp)
@@ -36,40 +36,60 @@
 namespace dfm {
 namespace {
 
-using Succeeds = bool (*)(World &w, StepContext &step, uint32_t *trouble);
-template <Succeeds stage>
+// The part of the world, or of the buffers of a step, that has this type.
+template <class P>
+P part(World &w, StepContext &step, uint32_t *trouble) {
+  using Part = std::remove_cvref_t<P>;
+  if constexpr (std::is_same_v<Part, uint32_t *>) return trouble;
+  else if constexpr (std::is_same_v<Part, Budget>) return step.budget;
+  else if constexpr (std::is_same_v<Part, StepImpulses>) return w.step_impulses;
+  else if constexpr (std::is_base_of_v<Part, World>) return w;
+  else return step;
+}
+template <class R, class... P>
+Next call(R (*stage)(P...), World &w, StepContext &step, uint32_t *trouble) {
+  if constexpr (std::is_same_v<R, Next>) {
+    return stage(part<P>(w, step, trouble)...);
+  } else if constexpr (std::is_same_v<R, bool>) {
+    return go_on(stage(part<P>(w, step, trouble)...));
+  } else {
+    stage(part<P>(w, step, trouble)...);
+    return Next::stage;
+  }
+}
+template <auto stage>
 Next row(World &w, StepContext &step, uint32_t *trouble) {
-  return go_on(stage(w, step, trouble));
+  return call(stage, w, step, trouble);
 }
-bool predict(World &w, StepContext &step, uint32_t *trouble) {
-  return stage_predict(w, step, trouble) && watch_energy(w, step, trouble);
+
+template <class R, class... P>
+constexpr bool takes_world(R (*)(P...)) {
+  return (std::is_same_v<std::remove_cvref_t<P>, World> || ...);
 }
-bool solve(World &w, StepContext &step, uint32_t *trouble) {
-  const bool solved = stage_solve(w, step, trouble);
-  step.guard.resolving = false;
-  return solved;
-}
-bool distribute(World &, StepContext &step, uint32_t *) {
-  step.ended = false;
-  report_impulses(step);
-  return true;
-}
+template <auto... stages>
+constexpr int kTakeWorld = (takes_world(stages) + ...);
+static_assert(kTakeWorld<stage_motion, stage_model, stage_predict, stage_rigid_predict, stage_gather,
+                         stage_broad, stage_narrow, stage_self, stage_solve, stage_rigid_commit,
+                         stage_distribute, stage_guard, stage_commit, stage_sleep> <= 3,
+              "a stage takes the parts that it reads and writes");
 
 constexpr Stage kTable[] = {
     {"motion", row<stage_motion>, "what is prescribed", when::motion},
     {"model", row<stage_model>, "cells", when::model},
-    {"predict", row<predict>, "points", when::predict},
+    {"predict", row<stage_predict>, "points", when::predict, StageRole::none, watch_energy},
     {"rigid predict", row<stage_rigid_predict>, "rigid bodies", when::rigid_predict},
     {"gather", row<stage_gather>, "points of surfels", when::gather},
     {"broad", row<stage_broad>, "surfels every sub-step; triangles whenever a skin is used up", when::broad,
      StageRole::lists_pairs},
-    {"narrow", stage_narrow, "candidate pairs", when::narrow, StageRole::finds_contacts},
+    {"narrow", row<stage_narrow>, "candidate pairs", when::narrow, StageRole::finds_contacts},
     {"self contact", row<stage_self>,
      "surfels every sub-step, and what of them is near; triangles whenever a skin is used up", when::self},
-    {"contact+friction", row<solve>, "contacts x sweeps, laws once per pass", when::solve, StageRole::solves},
-    {"rigid commit", stage_rigid_commit, "rigid bodies", when::rigid_commit},
-    {"distribute", row<distribute>, "contacts and surfels", when::distribute, StageRole::reports_impulses},
-    {"guard", stage_guard, "candidate pairs that may come nearer than d_c / 2 within the sub-step",
+    {"contact+friction", row<stage_solve>, "contacts x sweeps, laws once per pass", when::solve,
+     StageRole::solves},
+    {"rigid commit", row<stage_rigid_commit>, "rigid bodies", when::rigid_commit},
+    {"distribute", row<stage_distribute>, "contacts and surfels", when::distribute,
+     StageRole::reports_impulses},
+    {"guard", row<stage_guard>, "candidate pairs that may come nearer than d_c / 2 within the sub-step",
      when::guard, StageRole::guards},
     {"commit", row<stage_commit>, "points", when::commit},
     {"sleep", row<stage_sleep>, "velocities of bodies that are awake", when::sleep},
@@ -95,7 +115,8 @@ Next run(size_t row, World &w, StepContext &step, uint32_t *trouble, Clock::time
   };
   w.context->trace_begin(stage.name);
   const Timer timer{stage, w, step.stage_times[row], since};
-  return stage.run(w, step, trouble);
+  const Next next = stage.run(w, step, trouble);
+  return next == Next::stage && stage.check ? go_on(stage.check(w, step, trouble)) : next;
 }
 
 bool advance(World &w, StepContext &step, double end, double goal, bool last, uint32_t *trouble);
@@ -306,7 +327,8 @@ bool advance(World &w, StepContext &step, double end, double goal, bool last, ui
     step.rest = step.h = end - w.time;
     step.left = goal - w.time;
     // only where the budget of the step has room for one piece more
-    if (step.length.next_piece > 0 && step.length.next_piece < step.rest && may_repeat(w, step))
+    if (step.length.next_piece > 0 && step.length.next_piece < step.rest &&
+        may_repeat(w, w, step, step.budget))
       step.h = step.length.next_piece;
     view_obstacles(w, step);
     // waking changes state that a later failure must restore
@@ -376,8 +398,11 @@ bool take_substep(World &w, StepContext &step, uint32_t *trouble) {
   return true;
 }
 
-// Stages model to broad for bodies that contacts have woken.
+// Wakes the islands of sleeping bodies that contacts meet; stages model to broad for them.
 bool catch_up(World &w, StepContext &step, uint32_t *trouble) {
+  step.woken.clear();
+  for (const uint32_t slot : step.met) wake(w, *w.bodies[slot]);
+  std::ranges::sort(step.woken);
   struct Restored {
     World &w;
     ~Restored() { gather_active(w); }
@@ -385,10 +410,10 @@ bool catch_up(World &w, StepContext &step, uint32_t *trouble) {
   {
     const Restored all{w};
     step.active.swap(step.woken);
-    if (!stage_model(w, step, trouble) || !stage_predict(w, step, trouble)) return false;
-    stage_gather(w, step, trouble);
+    for (const auto stage : {row<stage_model>, row<stage_predict>, row<stage_gather>})
+      if (stage(w, step, trouble) != Next::stage) return false;
   }
-  return stage_broad(w, step, trouble);
+  return row<stage_broad>(w, step, trouble) == Next::stage;
 }
 
 // The place of a role among the planned stages.

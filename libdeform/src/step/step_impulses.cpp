@@ -87,11 +87,10 @@ void begin_impulses(StepImpulses &s, double start, double length) {
   s.idle = 0;
 }
 
-void reserve_impulses(World &w, size_t contacts, size_t pairs) {
-  Array<StepImpulses::Pair> &list = w.step_impulses.pairs;
-  const size_t most = w.bodies.size() * (w.bodies.size() + w.obstacles.size());
-  if (w.step_impulses.idle > 0) contacts += w.store.n;
-  list.reserve(list.size() + std::min(contacts, most) + pairs);
+void reserve_impulses(StepImpulses &impulses, const WorldState &state, size_t most, size_t contacts,
+                      size_t pairs) {
+  if (impulses.idle > 0) contacts += state.store.n;
+  impulses.pairs.reserve(impulses.pairs.size() + std::min(contacts, most) + pairs);
 }
 
 void add_impulses(World &w, const ContactStore &s) { add(w, s, w.time, s.h, w.step_impulses.pairs); }
@@ -99,7 +98,7 @@ void add_impulses(World &w, const ContactStore &s) { add(w, s, w.time, s.h, w.st
 void end_idle(World &w) {
   StepImpulses &s = w.step_impulses;
   if (!(s.idle > 0)) return;
-  reserve_impulses(w, 0, 0);
+  reserve_impulses(s, w, w.bodies.size() * (w.bodies.size() + w.obstacles.size()), 0, 0);
   add(w, w.store, w.time - s.idle, s.idle, s.pairs);
   s.idle = 0;
 }

@@ -8,10 +8,12 @@ namespace dfm {
 
 struct ContactStore;
 struct World;
+struct WorldState;
 
 void begin_impulses(StepImpulses &s, double start, double length);  // s
-// So that these cannot fail: contacts of bodies, pairs of rigid things
-void reserve_impulses(World &w, size_t contacts, size_t pairs);
+// So that these cannot fail: contacts of bodies, pairs of rigid things; most: pairs with a body, all.
+void reserve_impulses(StepImpulses &impulses, const WorldState &state, size_t most, size_t contacts,
+                      size_t pairs);
 void add_impulses(World &w, const ContactStore &s);  // of the sub-step that one of its stores holds
 // Before the store changes: adds what sleepers have exchanged in the idle sub-steps up to now.
 void end_idle(World &w);

@@ -24,29 +24,29 @@ World::World(dfm_context *c)
 
 World::~World() = default;
 
-Body *World::body(uint64_t id) const {
+Body *Entities::body(uint64_t id) const {
   const uint32_t i = slot_of(*this, id);
   return i == kNone ? nullptr : bodies[i].get();
 }
-Obstacle *World::obstacle(uint64_t id) const {
+Obstacle *Entities::obstacle(uint64_t id) const {
   const uint32_t i = obstacle_slot_of(*this, id);
   return i == kNone ? nullptr : obstacles[i].get();
 }
 
-Body *World::find_body(const std::string &name) {
+Body *Entities::find_body(const std::string &name) {
   for (auto *list : {&bodies, &emptied})
     for (auto &b : *list)
       if (b->name == name) return b.get();
   return nullptr;
 }
 
-Obstacle *World::find_obstacle(const std::string &name) {
+Obstacle *Entities::find_obstacle(const std::string &name) {
   for (auto &o : obstacles)
     if (o->name == name) return o.get();
   return nullptr;
 }
 
-uint64_t World::handle_of(uint64_t id) const {
+uint64_t Entities::handle_of(uint64_t id) const {
   const auto among = [id](const auto &list) -> const Body * {
     const auto at = std::ranges::find(list, id, [](const auto &b) { return b->id; });
     return at != list.end() ? at->get() : nullptr;

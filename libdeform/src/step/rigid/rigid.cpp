@@ -19,13 +19,13 @@ namespace dfm {
 namespace {
 
 // said: sentences() before the call of the host. Includes the host's reason if it has given one.
-bool host_failed(const World &w, const RigidSet &set, const HostFault &fault, uint64_t said,
+bool host_failed(const WorldState &state, const RigidSet &set, const HostFault &fault, uint64_t said,
                  uint32_t *trouble) {
   need_memory(fault.status);
   const std::string why =
       said != sentences() ? last_error() : "take a smaller step or look at its masses and motors";
   return fail_step(trouble, DFM_TROUBLE_PLUGIN, "%s, rigid body '%s' and those with it: host '%s' %s; %s",
-                   at_step(w).c_str(), set.defs[0].name, set.host_name.c_str(), fault.what, why.c_str());
+                   at_step(state).c_str(), set.defs[0].name, set.host_name.c_str(), fault.what, why.c_str());
 }
 
 }  // namespace
@@ -72,31 +72,37 @@ void place_rigids(World &w) {
           o->rigid->first_group + o->rigid->group[o->rigid_body], o->rigid->place[o->rigid_body], {}};
 }
 
-bool query_rigids(World &w, uint32_t *trouble) {
+namespace {
+
+bool query_rigids(const WorldState &state, const Entities &entities, uint32_t *trouble) {
   const uint64_t said = sentences();
-  for (auto &set : w.rigid_sets)
-    if (const HostFault fault = set->free_motion()) return host_failed(w, *set, fault, said, trouble);
+  for (auto &set : entities.rigid_sets)
+    if (const HostFault fault = set->free_motion()) return host_failed(state, *set, fault, said, trouble);
   return true;
 }
 
-bool stage_rigid_predict(World &w, StepContext &step, uint32_t *trouble) {
-  step.rigid_again = false;
-  for (auto &set : w.rigid_sets) set->begin(sub_step_of(w, step));
-  if (!query_rigids(w, trouble)) return false;
-  if (!step.tools->begin(w, step)) return false;
-  for (auto &set : w.rigid_sets) set->first.assign(set->velocity.begin(), set->velocity.end());
-  for (auto &o : w.obstacles) {
+}  // namespace
+
+bool stage_rigid_predict(const WorldMemory &memory, const WorldState &state, const Entities &entities,
+                         const Rules &rules, const Derived &derived, const Awake &awake, SubStepTimes &times,
+                         Budget &budget, Views &views, Solution &solution, uint32_t *trouble) {
+  solution.rigid_again = false;
+  for (auto &set : entities.rigid_sets) set->begin(sub_step_of(state, rules, times));
+  if (!query_rigids(state, entities, trouble)) return false;
+  if (!views.tools->begin(memory, state, entities, derived, awake, views, times, budget)) return false;
+  for (auto &set : entities.rigid_sets) set->first.assign(set->velocity.begin(), set->velocity.end());
+  for (auto &o : entities.obstacles) {
     if (!is_moved(*o)) continue;
     const dfm_rigid_state &s = o->rigid->state[o->rigid_body];
     const double *const v = &o->rigid->velocity[6 * size_t{o->rigid_body}];
-    ObstacleView &view = step.obstacle_views[o->slot];
+    ObstacleView &view = views.obstacle_views[o->slot];
     view.velocity = o->added
-                        ? mean_velocity_at(*o, v, rotate(load_quat(s.rotation), o->local.position), step.h)
+                        ? mean_velocity_at(*o, v, rotate(load_quat(s.rotation), o->local.position), times.h)
                         : load3(v);
     view.spin = load3(v + 3);
     view.linear = view.spin - load3(s.spin);
     if (o->mesh) o->mesh->place(view.position, view.rotation, view.velocity, view.spin);
-    step.rigid_places[o->slot].center = load3(s.position);
+    views.rigid_places[o->slot].center = load3(s.position);
   }
   return true;
 }
@@ -143,14 +149,16 @@ void start_rigids(World &w, StepContext &step) {
   }
 }
 
-void sum_rigid_impulses(World &w, StepContext &step) {
-  for (auto &set : w.rigid_sets) std::fill(set->impulse.begin(), set->impulse.end(), 0.0);
-  const ContactRows &rows = step.rows;
-  if (!w.plan.has(StageRole::solves) || rows.rigid.empty()) return;
-  step.tools->add_impulses();
+void sum_rigid_impulses(const Entities &entities, const Derived &derived, const Views &views,
+                        const Detection &detection, const Solution &solution) {
+  for (auto &set : entities.rigid_sets) std::fill(set->impulse.begin(), set->impulse.end(), 0.0);
+  const ContactRows &rows = solution.rows;
+  if (!derived.plan.has(StageRole::solves) || rows.rigid.empty()) return;
+  views.tools->add_impulses();
   for (uint32_t i = 0; i < rows.all(); ++i) {
     if (rows.rigid[i] == kNone || (i >= rows.soft() && i < rows.n)) continue;
-    const Obstacle &o = *w.obstacles[i < rows.n ? step.contacts[i].slot_b : step.bonds[i - rows.n].slot_b];
+    const Obstacle &o =
+        *entities.obstacles[i < rows.n ? detection.contacts[i].slot_b : solution.bonds[i - rows.n].slot_b];
     const Vec3 p = -rows.world_impulse(i);
     double *const to = &o.rigid->impulse[6 * size_t{o.rigid_body}];
     add3(to, p);
@@ -160,7 +168,7 @@ void sum_rigid_impulses(World &w, StepContext &step) {
 
 bool follow_rigids(World &w, StepContext &step, double left, bool revises, Followed &out, uint32_t *trouble) {
   step.tools->take(step, left);
-  sum_rigid_impulses(w, step);
+  sum_rigid_impulses(w, w, step, step, step);
   out = {};
   const uint64_t said = sentences();
   for (auto &set : w.rigid_sets) {
@@ -186,54 +194,65 @@ void restart_rigids(World &w, StepContext &step) {
   step.rows.restart_rigids();
 }
 
+namespace {
+
 // again: whether a host requests another solve.
-bool query_rigid_ends(World &w, bool &again, uint32_t *trouble) {
+bool query_rigid_ends(const WorldState &state, const Entities &entities, bool &again, uint32_t *trouble) {
   const uint64_t said = sentences();
-  for (auto &set : w.rigid_sets)
-    if (const HostFault fault = set->take_impulses()) return host_failed(w, *set, fault, said, trouble);
-  for (auto &set : w.rigid_sets) {
+  for (auto &set : entities.rigid_sets)
+    if (const HostFault fault = set->take_impulses()) return host_failed(state, *set, fault, said, trouble);
+  for (auto &set : entities.rigid_sets) {
     bool one = false;
-    if (const HostFault fault = set->end_state(one)) return host_failed(w, *set, fault, said, trouble);
+    if (const HostFault fault = set->end_state(one)) return host_failed(state, *set, fault, said, trouble);
     again |= one;
   }
   return true;
 }
 
-Next stage_rigid_commit(World &w, StepContext &step, uint32_t *trouble) {
-  sum_rigid_impulses(w, step);
-  step.tools->list(w, step);
+}  // namespace
+
+Next stage_rigid_commit(const WorldMemory &memory, WorldState &state, const Entities &entities,
+                        const Derived &derived, const Awake &awake, const FreeMotions &motions,
+                        const Detection &detection, SubStepTimes &times, Budget &budget, Views &views,
+                        Solution &solution, StepImpulses &impulses, uint32_t *trouble) {
+  sum_rigid_impulses(entities, derived, views, detection, solution);
+  ToolTouch &tools = *views.tools;
+  tools.list(state, solution);
   bool again = false;
-  if (!query_rigid_ends(w, again, trouble)) return Next::stop;
-  step.rigid_again = again && step.rigid_rounds < DFM_RIGID_MOST_AGAIN && w.plan.has(StageRole::solves) &&
-                     step.rows.all() > 0;
-  if (step.rigid_again) {
-    ++step.rigid_rounds;
-    ++w.stats.rigid_again;
-    if (!query_rigids(w, trouble)) return Next::stop;
-    step.tools->correct();
+  if (!query_rigid_ends(state, entities, again, trouble)) return Next::stop;
+  solution.rigid_again = again && solution.rigid_rounds < DFM_RIGID_MOST_AGAIN &&
+                         derived.plan.has(StageRole::solves) && solution.rows.all() > 0;
+  if (solution.rigid_again) {
+    ++solution.rigid_rounds;
+    ++state.stats.rigid_again;
+    if (!query_rigids(state, entities, trouble)) return Next::stop;
+    tools.correct();
     return Next::solve;
   }
-  step.rigid_rounds = 0;
-  if (!step.tools->follows_arcs(w, step) || !step.tools->stays_out(w, step)) return Next::stop;
-  if (step.tools->jams(w, step)) return go_on(report_jam(w, step, trouble));
-  step.tools->turn_jaws();
-  reserve_reports(w, step);
+  solution.rigid_rounds = 0;
+  if (!tools.follows_arcs(entities, derived, awake, times, budget) ||
+      !tools.stays_out(memory, state, entities, derived, awake, views, times, budget))
+    return Next::stop;
+  if (tools.jams(entities, derived, views, motions, budget))
+    return go_on(report_jam(state, entities, detection, solution, views, trouble));
+  tools.turn_jaws();
+  reserve_reports(state, entities, derived, views, solution, impulses);
   // From here on (guard) their true motion is used.
-  for (auto &o : w.obstacles) {
+  for (auto &o : entities.obstacles) {
     if (!is_moved(*o)) continue;
     const Pose from = shape_pose(*o, o->rigid->state[o->rigid_body]);
     const Pose to = shape_pose(*o, o->rigid->next[o->rigid_body]);
-    step.obstacle_views[o->slot].velocity = (1 / step.h) * (to.position - from.position);
-    step.obstacle_views[o->slot].spin =
-        (1 / step.h) * rotation_vector(to.rotation * conjugate(from.rotation));
-    step.obstacle_views[o->slot].linear = {};
+    ObstacleView &view = views.obstacle_views[o->slot];
+    view.velocity = (1 / times.h) * (to.position - from.position);
+    view.spin = (1 / times.h) * rotation_vector(to.rotation * conjugate(from.rotation));
+    view.linear = {};
   }
   return Next::stage;
 }
 
 void keep_rigids(World &w, StepContext &step) {
   if (!w.rigid_sets.empty()) step.tools->keep(w);  // else stage_rigid_predict() has not made anything
-  for (auto &set : w.rigid_sets) set->commit(sub_step_of(w, step), step.guard.motion);
+  for (auto &set : w.rigid_sets) set->commit(sub_step_of(w, w, step), step.guard.motion);
   if (!w.rigid_sets.empty())
     for (auto &o : w.obstacles)
       if (o->rigid) o->pose = shape_pose(*o, o->rigid->state[o->rigid_body]);

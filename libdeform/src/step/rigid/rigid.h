@@ -9,9 +9,14 @@
 
 namespace dfm {
 
-struct StepContext;
-struct World;
+struct Derived;
+struct Detection;
+struct Entities;
 struct Obstacle;
+struct Solution;
+struct StepContext;
+struct Views;
+struct World;
 
 // The velocity of a body with this velocity and spin [6], at an arm from its center.
 inline Vec3 velocity_at(const double *v, Vec3 arm) { return load3(v) + cross(load3(v + 3), arm); }
@@ -26,7 +31,9 @@ void destroy_rigids(RigidSet &set);  // throws Error if the host owns its bodies
 Obstacle &rigid_obstacle(World &w, uint64_t id);
 void place_rigids(World &w);  // World::prepare(): slots and groups
 bool rigid_response(World &w, StepContext &step, const ContactRows::Block &group, uint32_t *trouble);
-void sum_rigid_impulses(World &w, StepContext &step);  // of the rows, into every set
+// of the rows, into every set
+void sum_rigid_impulses(const Entities &entities, const Derived &derived, const Views &views,
+                        const Detection &detection, const Solution &solution);
 // Whether a solve must go on, because turning or motors go otherwise than it assumed; renewed: a host has
 // decided again about motors, so that responses have changed.
 struct Followed { bool goes_on = false, renewed = false; };

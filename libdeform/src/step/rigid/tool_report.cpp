@@ -28,7 +28,7 @@ constexpr double kApart = 0.1;
 // Whether the first of the two is side b of reports.
 bool ToolTouch::b_first(const Obstacle &a, const Obstacle &b) { return is_moved(b) && !is_moved(a); }
 
-bool b_first(const World &w, const ContactStore &s, uint32_t i) {
+bool b_first(const Entities &w, const ContactStore &s, uint32_t i) {
   const Obstacle *const a = w.obstacle(s.id_a[i]);  // of two rigid things alone
   return a && ToolTouch::b_first(*a, *w.obstacle(s.id_b[i]));
 }
@@ -39,15 +39,15 @@ PairSides pair_sides(const World &w, const ContactStore &s, uint32_t i) {
   return turned ? PairSides{b, a, true} : PairSides{a, b, false};
 }
 
-std::string ToolTouch::row_names(const World &w, uint32_t row) const {
+std::string ToolTouch::row_names(const Entities &entities, uint32_t row) const {
   const auto &ids = rows_[row].pair->id;
-  return format("'%s' and '%s'", name_of(w, ids[0]).c_str(), name_of(w, ids[1]).c_str());
+  return format("'%s' and '%s'", name_of(entities, ids[0]).c_str(), name_of(entities, ids[1]).c_str());
 }
 
 // Memory for it is needed before the sub-step is final.
-void ToolTouch::list(const World &w, const StepContext &step) {
-  keep_next(step);
-  const Array<RigidPair> &before = w.rigid_touching;
+void ToolTouch::list(const WorldState &state, const Solution &solution) {
+  keep_next(solution);
+  const Array<RigidPair> &before = state.rigid_touching;
   next_touching_.clear();
   next_touching_.reserve(rows_.size());
   for (const Row &row : rows_) {

@@ -68,8 +68,8 @@ bool ToolTouch::fill_response(uint32_t group, double *matrix) const {
   return false;
 }
 
-std::span<const RigidMember> ToolTouch::members(const StepContext &step, uint32_t group) const {
-  return {step.rigid_members.data() + step.rigid_first[group], step.rigid_groups[group]};
+std::span<const RigidMember> ToolTouch::members(const Views &views, uint32_t group) const {
+  return {views.rigid_members.data() + views.rigid_first[group], views.rigid_groups[group]};
 }
 
 bool ToolTouch::free_velocity(const RigidSet &set, uint32_t body, double *out) const {

@@ -30,10 +30,10 @@ uint64_t ToolTouch::key_of(const std::array<uint64_t, 2> &pair, Name name) {
 }
 
 // Sets the frames of the rows and their initial impulses, and adds these to the velocities.
-void ToolTouch::take_last(const World &w, const StepContext &step) {
+void ToolTouch::take_last(const WorldState &state, const Derived &derived, const Views &views) {
   const uint32_t n = static_cast<uint32_t>(rows_.size());
   uint32_t nstate = 0;
-  for (const Row &row : rows_) nstate = std::max(nstate, w.pairs.laws[row.pair->law]->nstate);
+  for (const Row &row : rows_) nstate = std::max(nstate, derived.pairs.laws[row.pair->law]->nstate);
   state_.resize(n, nstate);
   points_.assign(n, {});
   tangents_.resize(3 * size_t{n});
@@ -44,7 +44,7 @@ void ToolTouch::take_last(const World &w, const StepContext &step) {
     state_.law[i] = rows_[i].pair->law;
     state_.area[i] = kArea;
   }
-  warm_start(w.tool_store, points_, h_, start_, state_, tangents_.data(), match_.data());
+  warm_start(state.tool_store, points_, h_, start_, state_, tangents_.data(), match_.data());
   for (uint32_t i = 0; i < n; ++i) {
     Row &row = rows_[i];
     row.tangent[0] = load3(&tangents_[3 * size_t{i}]);
@@ -57,13 +57,13 @@ void ToolTouch::take_last(const World &w, const StepContext &step) {
       m.reach[side->part] = std::max(m.reach[side->part], norm(side->arm));
     }
   }
-  add_rows_to_velocities(step);
-  drop_bad_starts(step);
+  add_rows_to_velocities(views);
+  drop_bad_starts(views);
   for (Row &row : rows_) follow_arc(row);
 }
 
 // `now` is that without soft bodies.
-void ToolTouch::add_rows_to_velocities(const StepContext &step) {
+void ToolTouch::add_rows_to_velocities(const Views &views) {
   for (Moved &m : sides_) {
     for (size_t k = 0; k < m.now.size(); ++k) m.now[k] = m.free[k] + m.turn[k];
     if (m.set) std::fill(m.set->impulse.begin(), m.set->impulse.end(), 0.0);
@@ -77,7 +77,7 @@ void ToolTouch::add_rows_to_velocities(const StepContext &step) {
     }
     for (uint32_t g = 0; m.responds && g < m.set->ngroup; ++g) {
       if (m.first[g] == kNone) continue;
-      const auto bodies = members(step, m.set->first_group + g);
+      const auto bodies = members(views, m.set->first_group + g);
       for (size_t r = 0; r < m.wide[g]; ++r)
         for (size_t c = 0; c < m.wide[g]; ++c)
           m.now[6 * size_t{bodies[r / 6].body} + r % 6] +=
@@ -90,7 +90,7 @@ void ToolTouch::add_rows_to_velocities(const StepContext &step) {
 // Impulses of rows that contradict each other may be large while what they do cancels, and an impact repeats
 // itself in no later sub-step. Where impulses make the places of connected groups faster than none would,
 // none are the start.
-void ToolTouch::drop_bad_starts(const StepContext &step) {
+void ToolTouch::drop_bad_starts(const Views &views) {
   std::vector<uint32_t> &first = first_group_;  // of each side, among all
   first.assign(1, 0);
   for (const Moved &m : sides_) first.push_back(first.back() + (m.set ? m.set->ngroup : 0));
@@ -120,14 +120,14 @@ void ToolTouch::drop_bad_starts(const StepContext &step) {
       row.impulse = row.along[0] = row.along[1] = 0;
       any = true;
     }
-  if (any) add_rows_to_velocities(step);
+  if (any) add_rows_to_velocities(views);
 }
 
 Vec3 ToolTouch::slip(const Row &row) const { return speed(row) + row.bend; }
 
 // Memory for it is needed before the sub-step is final.
-void ToolTouch::keep_next(const StepContext &step) {
-  const ContactState &state = step.state;
+void ToolTouch::keep_next(const Solution &solution) {
+  const ContactState &state = solution.state;
   ContactStore &to = next_;
   uint32_t n = 0;
   for (const Row &row : rows_) n += row.impulse > 0;
@@ -153,7 +153,7 @@ void ToolTouch::keep_next(const StepContext &step) {
     store3(&to.turned[3 * size_t{n}], row.tangent[0]);
     store3(&to.point[3 * size_t{n}], row.at);
     to.gap[n] = row.gap - offset_;
-    const uint32_t r = step.rows.soft() + i;
+    const uint32_t r = solution.rows.soft() + i;
     for (size_t k = 0; k < 2; ++k) to.slip[2 * size_t{n} + k] = dot(row.tangent[k], slip(row));
     for (uint32_t s = 0; s < to.nstate; ++s)
       to.bristle[size_t{to.nstate} * n + s] = state.bristle_out[size_t{s} * state.stride + r];
@@ -161,7 +161,7 @@ void ToolTouch::keep_next(const StepContext &step) {
     to.dwell[n] = state_.dwell[i] + h_;
     to.area[n] = kArea;
     to.touching[n] = 1;
-    to.sticks[n] = step.rows.wt[r] > 0 && state.mode[r] == 1;
+    to.sticks[n] = solution.rows.wt[r] > 0 && state.mode[r] == 1;
     to.began[n] = match_[i] == kNone;
     ++n;
   }

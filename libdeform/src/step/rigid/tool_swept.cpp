@@ -163,41 +163,45 @@ bool ToolTouch::goes_far(const Pair &pair) const {
 }
 
 // The fraction of the sub-step after which the two meet; above 1: they do not.
-double ToolTouch::meeting(const World &w, const StepContext &step, const Pair &pair, ToolShape &a,
+double ToolTouch::meeting(const Entities &entities, const Views &views, const Pair &pair, ToolShape &a,
                           ToolShape &b) const {
   if (!cull_facing(a, b, ways_[pair.a] + ways_[pair.b] + offset_, true)) return HUGE_VAL;
   const auto way_of = [&](uint32_t i) {
-    return Way(*w.obstacles[i], step.obstacle_views[w.obstacles[i]->slot], step.h);
+    return Way(*entities.obstacles[i], views.obstacle_views[entities.obstacles[i]->slot], h_);
   };
   const Way at_a = way_of(pair.a), at_b = way_of(pair.b);
   const Sight from_b{a, b, at_a, at_b, offset_, pair.thin}, from_a{b, a, at_b, at_a, offset_, pair.thin};
   return std::min({from_b.corners(), from_a.corners(), from_b.edges()});
 }
 
-bool ToolTouch::stays_out(World &w, StepContext &step) {
+bool ToolTouch::stays_out(const WorldMemory &memory, const WorldState &state, const Entities &entities,
+                          const Derived &derived, const Awake &awake, const Views &views, SubStepTimes &times,
+                          Budget &budget) {
   if (pairs_.empty()) return true;
   ways_.clear();
   turns_.clear();
-  for (const auto &o : w.obstacles) {
-    const ObstacleView &v = step.obstacle_views[o->slot];
-    const Way way(*o, v, step.h);
+  for (const auto &o : entities.obstacles) {
+    const ObstacleView &v = views.obstacle_views[o->slot];
+    const Way way(*o, v, h_);
     const bool moves = is_moved(*o) || v.moves();
     turns_.push_back(moves ? turn_of(way, v) : 0);
     ways_.push_back(moves ? longest(way, v, turns_.back()) : 0);
     reach_[o->slot] = ways_.back() + offset_;
   }
-  find_near(step);
+  find_near(views);
   double first = HUGE_VAL;
   const auto far = [&](const Pair &pair) { return !pair.jaw && goes_far(pair); };
+  const auto meet = [&](const Pair &pair, ToolShape &a, ToolShape &b, Side, Side) {
+    if (far(pair)) first = std::min(first, meeting(entities, views, pair, a, b));
+  };
   if (std::ranges::any_of(near_, [&](uint32_t k) { return far(pairs_[k]); }))
-    each_pair(w, step, [&](const Pair &pair, ToolShape &a, ToolShape &b, Side, Side) {
-      if (far(pair)) first = std::min(first, meeting(w, step, pair, a, b));
-    });
-  if (!(first <= 1) || !(step.h > kMinSubstep * step.length.planned) || !may_repeat(w, step)) {
-    warn_passing(w, step);
+    each_pair(entities, views, std::ref(meet));
+  if (!(first <= 1) || !(times.h > kMinSubstep * times.length.planned) ||
+      !may_repeat(entities, derived, awake, budget)) {
+    warn_passing(memory, state, entities, views);
     return true;
   }
-  step.length.repeat_grown(std::max(kMinCut, kAims * first));
+  times.length.repeat_grown(std::max(kMinCut, kAims * first));
   return false;
 }
 

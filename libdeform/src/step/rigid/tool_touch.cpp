@@ -389,8 +389,8 @@ double ToolTouch::add_rows(Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Si
 bool ToolTouch::is_of_set(const Obstacle &o) const { return side_of_[o.slot].tool < sets_.size(); }
 
 // Adds the pairs of which the balls around the two meet that are larger by reach_.
-void ToolTouch::find_near(const StepContext &step) {
-  for (Things *const things : {&moved_, &still_}) things->renew(step.obstacle_views, reach_);
+void ToolTouch::find_near(const Views &views) {
+  for (Things *const things : {&moved_, &still_}) things->renew(views.obstacle_views, reach_);
   const auto add = [&](uint32_t a, uint32_t b) {
     if (a > b) std::swap(a, b);
     const auto at = std::lower_bound(
@@ -408,11 +408,11 @@ void ToolTouch::find_near(const StepContext &step) {
 }
 
 // Calls f(pair, the two shapes, their sides) for all pairs that may touch and of which one yields.
-void ToolTouch::each_pair(const World &w, const StepContext &step, const Visit &f) {
+void ToolTouch::each_pair(const Entities &entities, const Views &views, const Visit &f) {
   for (const uint32_t k : near_) {
     Pair &pair = pairs_[k];
-    const Obstacle &a = *w.obstacles[pair.a], &b = *w.obstacles[pair.b];
-    const ObstacleView &va = step.obstacle_views[a.slot], &vb = step.obstacle_views[b.slot];
+    const Obstacle &a = *entities.obstacles[pair.a], &b = *entities.obstacles[pair.b];
+    const ObstacleView &va = views.obstacle_views[a.slot], &vb = views.obstacle_views[b.slot];
     if (pair.passes || !ToolShape::takes_part(va) || !ToolShape::takes_part(vb)) continue;
     const Side &at_a = side_of_[pair.a], &at_b = side_of_[pair.b];
     if (!sides_[at_a.tool].gives(b) && !sides_[at_b.tool].gives(a)) continue;
@@ -434,7 +434,7 @@ bool ToolTouch::follow(World &w, StepContext &step) {
   }
   changed = std::max(changed, follow_spin());
   charge(w, step, 0);
-  if (!(changed > kDone * tangent_at_rest(w, h_)) || !(changed < kFaster * changed_) ||
+  if (!(changed > kDone * tangent_at_rest(w, w, h_)) || !(changed < kFaster * changed_) ||
       passes_ == kMaxPasses || is_used_up(step))
     return false;
   changed_ = changed;
@@ -443,7 +443,7 @@ bool ToolTouch::follow(World &w, StepContext &step) {
 }
 
 // Takes velocities and responses of the sets that take part, and the motion of everything else.
-void ToolTouch::take_sets(World &w, StepContext &step) {
+void ToolTouch::take_sets(const Entities &entities, const Views &views) {
   sides_.resize(sets_.size() + !walls_.empty());
   for (size_t k = 0; k < sides_.size(); ++k) {
     Moved &m = sides_[k];
@@ -460,7 +460,7 @@ void ToolTouch::take_sets(World &w, StepContext &step) {
       m.center.resize(n);
       m.belt.resize(n);
       for (size_t i = 0; i < n; ++i) {
-        const ObstacleView &v = step.obstacle_views[walls_[i]];
+        const ObstacleView &v = views.obstacle_views[walls_[i]];
         m.center[i] = v.position;
         m.belt[i] = v.belt;
         store3(&m.free[6 * i], v.velocity);
@@ -478,12 +478,12 @@ void ToolTouch::take_sets(World &w, StepContext &step) {
     for (uint32_t i = 0; i < n; ++i) {
       const uint32_t g = set.group[i];
       if (g == DFM_RIGID_STILL || m.wide[g] > 0) continue;
-      m.wide[g] = 6 * size_t{step.rigid_groups[set.first_group + g]};
+      m.wide[g] = 6 * size_t{views.rigid_groups[set.first_group + g]};
       if (m.jointed[g]) later = true;  // where something is near
       else request_response(m, g);
     }
     m.responds = later || std::any_of(m.response.begin(), m.response.end(), [](double x) { return x != 0; });
-    for (const auto &t : w.tools)
+    for (const auto &t : entities.tools)
       if (t->set == m.set && t->has_jaws()) list_jaws(m);
     straighten(m);
     m.now = m.free;
@@ -495,7 +495,8 @@ void ToolTouch::take_sets(World &w, StepContext &step) {
 // touches turns so far that the sub-step must be repeated, shorter. The arc leaves its tangent by at most (h
 // w)^2 r / 2: what stays farther away than that does not touch. Where places are off by what the passes have
 // left, the sub-step goes on in its shortest pieces, which then grow again.
-bool ToolTouch::follows_arcs(const World &w, StepContext &step) const {
+bool ToolTouch::follows_arcs(const Entities &entities, const Derived &derived, const Awake &awake,
+                             SubStepTimes &times, Budget &budget) const {
   double turn = 0, arrives = 1;
   for (const Row &row : rows_) {
     if (row.pair->jaw) continue;
@@ -514,45 +515,50 @@ bool ToolTouch::follows_arcs(const World &w, StepContext &step) const {
     const double closes = std::min(0.0, h_ * dot(row.normal, speed(row)));
     if (row.impulse > 0 || room + closes < leaves) turn = std::max(turn, most);
   }
-  if (off_ > kOff * offset_) arrives = std::min(arrives, kMinRepeated * step.length.planned / step.h);
-  if ((!(turn > 0) && arrives == 1) || !may_shorten(step) || !may_repeat(w, step)) return true;
-  step.length.repeat_grown(turn > 0 ? std::min(arrives, kAims * kArc / turn) : arrives);
+  if (off_ > kOff * offset_) arrives = std::min(arrives, kMinRepeated * times.length.planned / times.h);
+  if ((!(turn > 0) && arrives == 1) || !may_shorten(times) || !may_repeat(entities, derived, awake, budget))
+    return true;
+  times.length.repeat_grown(turn > 0 ? std::min(arrives, kAims * kArc / turn) : arrives);
   return false;
 }
 
 // Rows without a response take no part in the solve, and one without a solution ends at its budget: both
 // leave things that go on closing. Jaws turn at the end of the sub-step only (turn_jaws).
-bool ToolTouch::jams(const World &w, const StepContext &step) const {
-  if (step.budget.cuts_solves() || !has_prescribed_motion(w, step)) return false;
-  return std::ranges::any_of(rows_, [&, slow = normal_at_rest(w, h_)](const Row &row) {
+bool ToolTouch::jams(const Entities &entities, const Derived &derived, const Views &views,
+                     const FreeMotions &motions, const Budget &budget) const {
+  if (budget.cuts_solves() || !has_prescribed_motion(entities, views, motions)) return false;
+  return std::ranges::any_of(rows_, [&, slow = normal_at_rest(derived, h_)](const Row &row) {
     const double closes = -dot(row.normal, speed(row));
     return !row.pair->jaw && closes > slow && h_ * closes - row.gap > offset_;
   });
 }
 
-bool ToolTouch::begin(World &w, StepContext &step) {
+bool ToolTouch::begin(const WorldMemory &memory, const WorldState &state, const Entities &entities,
+                      const Derived &derived, const Awake &awake, const Views &views, SubStepTimes &times,
+                      Budget &budget) {
   rows_.clear();
   off_ = left_ = 0;
-  offset_ = w.offset;
+  offset_ = derived.offset;
   if (sets_.empty() && pairs_.empty()) return true;
-  h_ = step.h;
-  planned_ = step.length.planned;
+  h_ = times.h;
+  planned_ = times.length.planned;
   strong_ = 1;
-  take_sets(w, step);
+  take_sets(entities, views);
   for (const uint32_t k : near_) pairs_[k].reach = pairs_[k].turn = 0;
   near_ = planar_;
-  reach_.assign(w.obstacles.size(), offset_);
+  reach_.assign(entities.obstacles.size(), offset_);
   for (size_t i = 0; i < reach_.size(); ++i)
-    if (const ObstacleView &v = step.obstacle_views[i]; side_of_[i].tool != kNone)
+    if (const ObstacleView &v = views.obstacle_views[i]; side_of_[i].tool != kNone)
       reach_[i] += kReach * h_ * fastest(side_of_[i], v.position, ball_around(v));
-  find_near(step);
-  each_pair(w, step, [&](Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b) {
+  find_near(views);
+  const auto add = [&](Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b) {
     const double deep = add_rows(pair, a, b, at_a, at_b);
-    if (!pair.jaw && inside(a, b, deep)) warn_deep(w, pair, deep);
-  });
+    if (!pair.jaw && inside(a, b, deep)) warn_deep(memory, state, entities, pair, deep);
+  };
+  each_pair(entities, views, std::ref(add));
   if (rows_.empty()) return true;
-  if (!follows_arcs(w, step)) return false;
-  take_last(w, step);
+  if (!follows_arcs(entities, derived, awake, times, budget)) return false;
+  take_last(state, derived, views);
   for (const Moved &m : sides_)
     if (m.set) m.set->velocity.assign(m.now.begin(), m.now.end());
   return true;

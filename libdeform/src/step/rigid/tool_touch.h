@@ -42,13 +42,23 @@
 
 namespace dfm {
 
+struct Awake;
+struct Budget;
+struct Derived;
+struct Entities;
+struct FreeMotions;
 struct Obstacle;
 struct RigidMember;
 struct RigidPair;
 struct RigidSet;
 struct SceneFacts;
+struct Solution;
 struct StepContext;
+struct SubStepTimes;
+struct Views;
 struct World;
+struct WorldMemory;
+struct WorldState;
 
 class ToolTouch {
  public:
@@ -59,13 +69,15 @@ class ToolTouch {
 
   // Called before detection: finds the rows of this sub-step, and adds to the sets' velocities what their
   // impulses of the last one do. Returns false if the sub-step must be repeated, shorter (StepLength).
-  bool begin(World &w, StepContext &step);
+  bool begin(const WorldMemory &memory, const WorldState &state, const Entities &entities,
+             const Derived &derived, const Awake &awake, const Views &views, SubStepTimes &times,
+             Budget &budget);
   // The rows as part of a contact problem: sides of each row.
   std::span<const RigidSides> sides();
   // [6 bodies,6 bodies] 1/kg, of a world-wide group; false: it is unknown here
   bool fill_response(uint32_t group, double *matrix) const;
   // The bodies of a group, by their places in it.
-  std::span<const RigidMember> members(const StepContext &step, uint32_t group) const;
+  std::span<const RigidMember> members(const Views &views, uint32_t group) const;
   // m/s, rad/s [6] of a body without contact, with what turning adds. False: nothing here moves its set.
   bool free_velocity(const RigidSet &set, uint32_t body, double *out) const;
   void put(ContactRows &to, ContactState &state);
@@ -79,20 +91,24 @@ class ToolTouch {
   // Updates what turning adds, from the present solution. Returns whether the solve must go on.
   bool follow(World &w, StepContext &step);
   // Called once the rows are final: what the world is to keep of them.
-  void list(const World &w, const StepContext &step);
+  void list(const WorldState &state, const Solution &solution);
   // Whether the sub-step is short enough for the spin of what touches. False: as for begin().
-  bool follows_arcs(const World &w, StepContext &step) const;
+  bool follows_arcs(const Entities &entities, const Derived &derived, const Awake &awake, SubStepTimes &times,
+                    Budget &budget) const;
   // Called after the hosts have ended their sub-step: whether nothing that yields has met on its way what its
   // rows do not keep it apart from. False: as for begin().
-  bool stays_out(World &w, StepContext &step);
+  bool stays_out(const WorldMemory &memory, const WorldState &state, const Entities &entities,
+                 const Derived &derived, const Awake &awake, const Views &views, SubStepTimes &times,
+                 Budget &budget);
   // Whether things that are deep in each other go deeper, because what drives them leaves them no way.
-  bool jams(const World &w, const StepContext &step) const;
+  bool jams(const Entities &entities, const Derived &derived, const Views &views, const FreeMotions &motions,
+            const Budget &budget) const;
   // Turns the ends of the jaws.
   void turn_jaws();
   // Called at the end of an accepted sub-step: moves what lasts to the world.
   void keep(World &w) noexcept;
   ContactStore &next() { return next_; }
-  std::string row_names(const World &w, uint32_t row) const;  // of the two things, for messages
+  std::string row_names(const Entities &entities, uint32_t row) const;  // of the two things, for messages
   // tool_report.cpp: for events, lists of contacts and sums of pairs
   static bool b_first(const Obstacle &a, const Obstacle &b);
   Array<RigidPair> &next_touching() { return next_touching_; }
@@ -177,12 +193,12 @@ class ToolTouch {
   struct Place { Vec3 at, bone_a, bone_b; };
   Vec3 speed(const Row &row, const std::vector<double> Moved::*of = &Moved::now) const;
   using Visit = std::function<void(Pair &, ToolShape &, ToolShape &, Side, Side)>;
-  void each_pair(const World &w, const StepContext &step, const Visit &f);
+  void each_pair(const Entities &entities, const Views &views, const Visit &f);
   static bool cull_facing(ToolShape &a, ToolShape &b, double far, bool flat);
   double add_rows(Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b);
   void add_row(const Pair &pair, Name name, Side a, Side b, const Place &place, Vec3 normal, double gap,
                double reach);
-  void find_near(const StepContext &step);
+  void find_near(const Views &views);
   static uint64_t key_of(const std::array<uint64_t, 2> &pair, Name name);
   double fastest(const Side &side, Vec3 around, double reach) const;
   Vec3 center(const Side &side) const;
@@ -221,21 +237,24 @@ class ToolTouch {
   static double thickness(const Obstacle &o);
   bool goes_far_for_size(const Pair &pair) const;
   bool goes_far(const Pair &pair) const;
-  double meeting(const World &w, const StepContext &step, const Pair &pair, ToolShape &a, ToolShape &b) const;
+  double meeting(const Entities &entities, const Views &views, const Pair &pair, ToolShape &a,
+                 ToolShape &b) const;
   // tool_warnings.cpp
   double depth(ToolShape &a, ToolShape &b, bool edges) const;
-  void warn_deep(const World &w, const Pair &pair, double deep);
-  void warn_passing(const World &w, const StepContext &step);
+  void warn_deep(const WorldMemory &memory, const WorldState &state, const Entities &entities,
+                 const Pair &pair, double deep);
+  void warn_passing(const WorldMemory &memory, const WorldState &state, const Entities &entities,
+                    const Views &views);
   bool reported(const Pair &pair) const;
   bool inside(const ToolShape &a, const ToolShape &b, double deep) const;
   bool is_of_set(const Obstacle &o) const;
-  void take_sets(World &w, StepContext &step);
+  void take_sets(const Entities &entities, const Views &views);
   // tool_rub.cpp
-  void take_last(const World &w, const StepContext &step);
-  void add_rows_to_velocities(const StepContext &step);
-  void drop_bad_starts(const StepContext &step);
+  void take_last(const WorldState &state, const Derived &derived, const Views &views);
+  void add_rows_to_velocities(const Views &views);
+  void drop_bad_starts(const Views &views);
   Vec3 slip(const Row &row) const;
-  void keep_next(const StepContext &step);
+  void keep_next(const Solution &solution);
 
   static constexpr double kOpens = 0.1;  // of d_c in a sub-step, where two things are in each other
   static constexpr double kArc = 0.2;    // rad in a sub-step, of a free body that touches

@@ -21,8 +21,8 @@ constexpr uint32_t kEdgeParts = 16;  // pieces of an edge whose ends are tested
 constexpr double kDeep = 0.02;       // of the smaller one's reach: a smaller depth is not reported
 constexpr uint64_t kSeldom = 16;     // steps between two tests of driven tools against triangles
 
-bool cuts(const World &w, const Obstacle &o) {
-  return std::any_of(w.tools.begin(), w.tools.end(),
+bool cuts(const Entities &entities, const Obstacle &o) {
+  return std::any_of(entities.tools.begin(), entities.tools.end(),
                      [&](const auto &t) { return t->set == o.rigid && !t->cuts.bodies.empty(); });
 }
 
@@ -59,21 +59,23 @@ bool ToolTouch::reported(const Pair &pair) const {
 }
 
 // Warns, once for each pair, of what its rows open too slowly: something placed inside what keeps it out.
-void ToolTouch::warn_deep(const World &w, const Pair &pair, double deep) {
+void ToolTouch::warn_deep(const WorldMemory &memory, const WorldState &state, const Entities &entities,
+                          const Pair &pair, double deep) {
   if (reported(pair)) return;
   reported_.push_back(pair.id);
-  const Obstacle &a = *w.obstacles[pair.a], &b = *w.obstacles[pair.b];
-  w.context->warn(
+  const Obstacle &a = *entities.obstacles[pair.a], &b = *entities.obstacles[pair.b];
+  memory.context->warn(
       "'%s' is %.3g m deep in '%s' at %.6g s, which contact opens by %.2g m in a sub-step only; place it "
       "outside, or filter the pair",
-      (is_of_set(a) ? a : b).name.c_str(), deep, (is_of_set(a) ? b : a).name.c_str(), w.time,
+      (is_of_set(a) ? a : b).name.c_str(), deep, (is_of_set(a) ? b : a).name.c_str(), state.time,
       kOpens * offset_);
 }
 
 // Warns, once for each pair, of things that pass through each other: rigid bodies of other hosts (one with a
 // world of its own may let bodies overlap by a little), and tools without a coupling. Tools that cut are left
 // out: their edge goes into the table under what they cut.
-void ToolTouch::warn_passing(const World &w, const StepContext &step) {
+void ToolTouch::warn_passing(const WorldMemory &memory, const WorldState &state, const Entities &entities,
+                             const Views &views) {
   const auto can_move = [&](const Obstacle &o, const Obstacle &to) {
     if (!is_of_set(o)) return false;
     const Side &side = side_of_[o.slot];
@@ -83,38 +85,38 @@ void ToolTouch::warn_passing(const World &w, const StepContext &step) {
   };
   for (const uint32_t k : near_) {
     const Pair &pair = pairs_[k];
-    const Obstacle *a = w.obstacles[pair.a].get(), *b = w.obstacles[pair.b].get();
+    const Obstacle *a = entities.obstacles[pair.a].get(), *b = entities.obstacles[pair.b].get();
     if (reported(pair) || (!pair.passes && (can_move(*a, *b) || can_move(*b, *a)))) continue;
     if (pair.passes ? !is_moved(*a) : !is_of_set(*a)) std::swap(a, b);
     const bool wall = !pair.passes && !is_of_set(*b);
-    const ObstacleView &va = step.obstacle_views[a->slot], &vb = step.obstacle_views[b->slot];
+    const ObstacleView &va = views.obstacle_views[a->slot], &vb = views.obstacle_views[b->slot];
     if (!ToolShape::takes_part(va) || !ToolShape::takes_part(vb)) continue;
     const bool mesh = wall && (va.surface || vb.surface);
-    if ((wall && cuts(w, *a)) || (mesh && w.step_count % kSeldom != 0)) continue;
+    if ((wall && cuts(entities, *a)) || (mesh && state.step_count % kSeldom != 0)) continue;
     ToolShape shape_a(va, a->mesh.get()), shape_b(vb, b->mesh.get());
     const double deep = depth(shape_a, shape_b, !mesh);
     if (pair.passes || wall) {
       if (!inside(shape_a, shape_b, deep)) continue;
     } else if (!(deep > offset_) &&
-               !(goes_far_for_size(pair) && meeting(w, step, pair, shape_a, shape_b) <= 1))
+               !(goes_far_for_size(pair) && meeting(entities, views, pair, shape_a, shape_b) <= 1))
       continue;
     reported_.push_back(pair.id);
     if (pair.passes)
-      w.context->warn(
+      memory.context->warn(
           "'%s' is %.3g m deep in '%s' at %.6g s and goes through it; make both (what stands: \"fixed\") "
           "bodies of one host, of boxes or triangles, or filter the pair",
-          a->name.c_str(), deep, b->name.c_str(), w.time);
+          a->name.c_str(), deep, b->name.c_str(), state.time);
     else if (wall)
-      w.context->warn(
+      memory.context->warn(
           {"tool", a->name.c_str()},
           " is %.3g m deep in '%s' at %.6g s and goes through it, because it goes exactly where it "
           "is told; give it a \"coupling\" (stiffness), or filter the pair",
-          deep, b->name.c_str(), w.time);
+          deep, b->name.c_str(), state.time);
     else
-      w.context->warn(
+      memory.context->warn(
           "tools '%s' and '%s' have met at %.6g s%s and pass each other, because both go exactly where they "
           "are told; give one of them a \"coupling\" (stiffness), or filter the pair",
-          a->name.c_str(), b->name.c_str(), w.time,
+          a->name.c_str(), b->name.c_str(), state.time,
           deep > offset_ ? format(" (%.3g m deep)", deep).c_str() : "");
   }
 }

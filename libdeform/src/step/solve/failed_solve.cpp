@@ -17,7 +17,7 @@ namespace {
 
 // The body to name if no contact is the cause: with an invalid load or parameter, the body fails before its
 // contacts do.
-const Body &fastest(const World &w) {
+const Body &fastest(const Entities &w) {
   const Body *fast = w.bodies.front().get();
   double most = -1;
   for (const auto &b : w.bodies)
@@ -37,12 +37,15 @@ uint32_t spoilt(const StepContext &step) {
   return kNone;
 }
 
-std::string sides(const World &w, const StepContext &step, uint32_t i) {
-  if (i >= step.rows.soft() && i < step.rows.n) return step.tools->row_names(w, i - step.rows.soft());
-  if (i >= step.contacts.size() && w.bodies.empty()) return "rigid things that touch";
-  if (i >= step.contacts.size()) return format("body '%s' (the fastest one)", fastest(w).name.c_str());
-  const ContactPoint &c = step.contacts[i];
-  return names_of(w, w.bodies[c.slot_a]->id, id_of_b(w, c));
+std::string sides(const Entities &entities, const Detection &detection, const Solution &solution,
+                  const Views &views, uint32_t i) {
+  if (i >= solution.rows.soft() && i < solution.rows.n)
+    return views.tools->row_names(entities, i - solution.rows.soft());
+  if (i >= detection.contacts.size() && entities.bodies.empty()) return "rigid things that touch";
+  if (i >= detection.contacts.size())
+    return format("body '%s' (the fastest one)", fastest(entities).name.c_str());
+  const ContactPoint &c = detection.contacts[i];
+  return names_of(entities, entities.bodies[c.slot_a]->id, id_of_b(entities, c));
 }
 
 // Whether the inputs of the law at a contact are finite.
@@ -61,7 +64,7 @@ bool finite_inputs(const ContactState &s, const LawInstance &law, uint32_t i) {
 bool report_failed_solve(World &w, StepContext &step, const LawInstance *law, uint32_t contact,
                          uint32_t *trouble) {
   const uint32_t at = law ? contact : spoilt(step);
-  const std::string where = at_step(w) + ", " + sides(w, step, at);
+  const std::string where = at_step(w) + ", " + sides(w, step, step, step, at);
   constexpr const char *kDo = "take a smaller step, reduce the loads or change the law";
   if (!law || (at != kNone && !finite_inputs(step.state, *law, at)))
     return fail_step(trouble, DFM_TROUBLE_NONFINITE, "%s: the contact solve is not finite; %s", where.c_str(),
@@ -78,17 +81,19 @@ bool report_failed_solve(World &w, StepContext &step, const LawInstance *law, ui
                    what.c_str(), kDo);
 }
 
-bool report_jam(World &w, StepContext &step, uint32_t *trouble) {
+bool report_jam(const WorldState &state, const Entities &entities, const Detection &detection,
+                const Solution &solution, const Views &views, uint32_t *trouble) {
+  const ContactRows &rows = solution.rows;
   uint32_t worst = kNone;
-  for (uint32_t i = 0; i < step.rows.n; ++i)
-    if (worst == kNone || step.rows.impulse[3 * size_t{i}] > step.rows.impulse[3 * size_t{worst}]) worst = i;
-  const ContactPoint *const c = worst < step.contacts.size() ? &step.contacts[worst] : nullptr;
+  for (uint32_t i = 0; i < rows.n; ++i)
+    if (worst == kNone || rows.impulse[3 * size_t{i}] > rows.impulse[3 * size_t{worst}]) worst = i;
+  const ContactPoint *const c = worst < detection.contacts.size() ? &detection.contacts[worst] : nullptr;
   return fail_step(
       trouble, DFM_TROUBLE_UNCONVERGED,
       "%s, %s: squeezed until nothing can move; open what closes on it, move that more slowly, or "
       "make the body stiffer%s",
-      at_step(w).c_str(), sides(w, step, worst).c_str(),
-      c ? hint_of_attachment(w, w.bodies[c->slot_a]->id) : "");
+      at_step(state).c_str(), sides(entities, detection, solution, views, worst).c_str(),
+      c ? hint_of_attachment(state, entities.bodies[c->slot_a]->id) : "");
 }
 
 }  // namespace dfm

@@ -45,7 +45,7 @@ bool fill_responses(World &w, StepContext &step, uint32_t *trouble) {
     const uint32_t *const surfels = &step.rows.point[block.first];
     step.rows.set_response(block, true, [&](double *responses) {
       given =
-          b.dynamics->response(sub_step_of(w, step), block.count, surfels, responses) ||
+          b.dynamics->response(sub_step_of(w, w, step), block.count, surfels, responses) ||
           fail_step(trouble, DFM_TROUBLE_PLUGIN, "%s: model '%s' does not answer impulses; change the model",
                     at_step(w, b).c_str(), b.model.type->id);
     });
@@ -99,13 +99,20 @@ double start_depth(const World &w, const StepContext &step, const ContactPoint &
   return std::max(0.0, std::min(left - opened, depth));
 }
 
-bool may_shorten(const StepContext &step) { return step.h > kMinRepeated * step.length.planned; }
+bool may_shorten(const SubStepTimes &times) { return times.h > kMinRepeated * times.length.planned; }
 
-void report_impulses(StepContext &step) {
-  const ContactRows &rows = step.rows;
-  distribute(step.contacts, rows.frame.data(), rows.impulse.data(), step.sinks, step.given, step.bonds,
+void report_impulses(const Detection &detection, const Solution &solution, SubStepEnd &end) {
+  const ContactRows &rows = solution.rows;
+  distribute(detection.contacts, rows.frame.data(), rows.impulse.data(), end.sinks, end.given, solution.bonds,
              rows.impulse.data() + size_t{3} * rows.n);
 }
+
+void stage_distribute(const Detection &detection, const Solution &solution, SubStepEnd &end) {
+  end.ended = false;
+  report_impulses(detection, solution, end);
+}
+
+namespace {
 
 // Makes rows of the contacts, with the impulses of the last sub-step, which are not applied yet.
 bool make_rows(World &w, StepContext &step, uint32_t *trouble) {
@@ -168,8 +175,6 @@ bool make_rows(World &w, StepContext &step, uint32_t *trouble) {
   step.solve_islands->find(w, step);
   return true;
 }
-
-namespace {
 
 // Solves again, from the present impulses, until rigid bodies turn and drive as the solve assumed. bad: out,
 // an island with a law that fails. False: a rigid host has failed.
@@ -259,7 +264,7 @@ bool retry_shorter(World &w, StepContext &step, const SolveIsland &own, uint32_t
 bool cut_at_landing(World &w, StepContext &step) {
   if (step.rigid_again || step.guard.resolving) return true;
   const double share = lands_at(w, step);
-  if (share == 1 || !may_repeat(w, step)) return true;
+  if (share == 1 || !may_repeat(w, w, step, step.budget)) return true;
   step.length.repeat(share);
   return false;
 }
@@ -272,6 +277,7 @@ bool stage_solve(World &w, StepContext &step, uint32_t *trouble) {
   step.residual = {};
   if (!make_rows(w, step, trouble)) return false;
   if (!cut_at_landing(w, step)) return false;
+  step.guard.resolving = false;  // what it has kept is in the rows
   step.rows.apply_last();
   if (step.rows.all() == 0) {
     w.stats.passes = w.stats.sweeps = 0;

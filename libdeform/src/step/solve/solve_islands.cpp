@@ -69,8 +69,8 @@ bool evaluate_laws(const World &w, StepContext &step, SolveIsland &own) {
   const double *const response = step.rows.wt.data();
   set_trial(step.rows, own.part, step.h, response, step.state);
   // The sweeps are the next Newton step: from a slip with this relative error they reach its square.
-  if ((own.bad = own.batches.evaluate_local(step.h, response, 0.1 * tangent_at_rest(w, step.h), Set::of_start,
-                                            step.state)))
+  if ((own.bad = own.batches.evaluate_local(step.h, response, 0.1 * tangent_at_rest(w, w, step.h),
+                                            Set::of_start, step.state)))
     return false;
   if (own.batches.has_smooth()) linearize(step.rows, own.part, step.h, step.state);
   ++own.passes;
@@ -80,7 +80,7 @@ bool evaluate_laws(const World &w, StepContext &step, SolveIsland &own) {
 // m/s, what normals may be off by.
 double normal_tolerance(const World &w, const StepContext &step, const SolveIsland &own) {
   // static mode: no later sub-step corrects what this solve leaves
-  if (w.prescribed.is_static()) return tangent_at_rest(w, step.h);
+  if (w.prescribed.is_static()) return tangent_at_rest(w, w, step.h);
   return (own.batches.remembers() ? Set::remembered : 1) * normal_at_rest(w, step.h);
 }
 
@@ -124,7 +124,7 @@ void limit_work(StepContext &step, SolveIsland &own) {
 
 void solve_island(const World &w, StepContext &step, SolveIsland &own) {
   if (own.bad) return;
-  const double normal = normal_tolerance(w, step, own), least = tangent_at_rest(w, step.h);
+  const double normal = normal_tolerance(w, step, own), least = tangent_at_rest(w, w, step.h);
   const ToleranceBounds bounds{least,
                                own.implicit              ? least
                                : own.batches.remembers() ? Set::exact * least
@@ -391,7 +391,7 @@ void take_part_of_contact(const World &w, StepContext &step, double share) {
     rows.restore(own.part);
     take_least_work(rows, own.part);
   }
-  report_impulses(step);
+  report_impulses(step, step, step);
 }
 
 }  // namespace dfm

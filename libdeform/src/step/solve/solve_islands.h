@@ -99,7 +99,7 @@ class SolveIslands {
 // Share of a planned sub-step: no repeated one is shorter.
 inline constexpr double kMinRepeated = 1.0 / 256;
 // Whether a sub-step without a result can be repeated with half its length.
-bool may_shorten(const StepContext &step);
+bool may_shorten(const SubStepTimes &times);
 
 // Solves all open islands until the true residual of their laws is good enough. Returns an island in which a
 // law has failed, or null.

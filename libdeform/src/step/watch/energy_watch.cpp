@@ -39,7 +39,7 @@ constexpr double kNoLimit = 1e300;  // J, of a base: its energy may be anything
 // An implicit sub-step costs that much more, so the same share of the time allows as many more checks.
 constexpr uint32_t kAges = 32;
 
-bool watching(const World &w) { return w.def.energy_watch > 0; }
+bool watching(const Rules &r) { return r.def.energy_watch > 0; }
 bool steps_itself(const Body &b) { return b.model.stepper.has_value(); }
 // By backward Euler, or by the model itself: the balance is that of the true energy, and what is done counts
 // at the end of the sub-step.
@@ -147,7 +147,7 @@ bool look(World &w, const StepContext &step, Body &b, EnergySample &out) {
   // the call came between its prediction and its commit, which may share memory with the result
   double again = 0;
   if (steps_itself(b) && (!hides(b) || b.dynamics->abilities().late) &&
-      !b.dynamics->free_motion(sub_step_of(w, step), again))
+      !b.dynamics->free_motion(sub_step_of(w, w, step), again))
     return false;
   const double half_done = ends ? 0 : work_of_holders(w, step, b, 0) + work_of_new_size(w, step, b);
   out = {kinetic,
@@ -236,7 +236,7 @@ void book_end(World &w, StepContext &step, Body &b, double motion) {
   const double *const way = steps_itself(b) ? b.dynamics->end().mean : end;
   double loads = 0, gained = 0, held = 0;
   const double contact = work_of_contact(w, step, b, way);
-  const bool forces = driven && b.dynamics->end_forces(sub_step_of(w, step));
+  const bool forces = driven && b.dynamics->end_forces(sub_step_of(w, w, step));
   const bool by_point = load_booked || driven || motion < 1;
   for (uint32_t i = 0; by_point && i < p.n; ++i)
     for (size_t k = 0, at = size_t(i) * kStride; k < 3; ++k, ++at) {
@@ -315,11 +315,11 @@ const char *unwatched(const World &w, const Body &b) {
 // Of G = U(x) - m g.x + v.M v* / 2 with v* = v + h g + ..: a weight that changes does work at the places x -
 // h v / 2, whatever the motion; at x where G is the true energy. The sub-step may fail after this and be
 // tried again with another gravity, from the same state: then the rest is booked.
-void change_gravity(World &w, Vec3 gravity) {
-  const Vec3 by = gravity - w.gravity.now;
-  w.gravity.now = gravity;
-  if (!watching(w) || norm2(by) == 0) return;
-  for (auto &b : w.bodies) {
+void change_gravity(const WorldState &state, Entities &entities, Rules &rules, Vec3 gravity) {
+  const Vec3 by = gravity - rules.gravity.now;
+  rules.gravity.now = gravity;
+  if (!watching(rules) || norm2(by) == 0) return;
+  for (auto &b : entities.bodies) {
     if (!watched(*b)) continue;
     if (BodySums sums; at_end(*b) && b->dynamics->sums(sums)) {
       b->energy.work -= dot(by, sums.first);
@@ -327,7 +327,7 @@ void change_gravity(World &w, Vec3 gravity) {
     }
     b->dynamics->see_points();
     const Phyxels &p = b->p;
-    const double behind = at_end(*b) ? 0 : 0.5 * w.watch.last_h;
+    const double behind = at_end(*b) ? 0 : 0.5 * state.watch.last_h;
     for (uint32_t i = 0; i < p.n; ++i)
       for (size_t k = 0, at = size_t(i) * kStride; k < 3; ++k, ++at)
         b->energy.work -= p.mass[i] * by[int(k)] * (p.x[at] - (p.moves(at) ? behind * p.v[at] : 0));
@@ -410,7 +410,7 @@ bool watch_energy(World &w, StepContext &step, uint32_t *trouble) {
   w.watch.age = 0;
   s.energy_gain = std::max(s.energy_gain, now.gain);
   // what moves by less than contact counts as rest is at rest
-  const double at_rest = tangent_at_rest(w, step.h);
+  const double at_rest = tangent_at_rest(w, w, step.h);
   const double largest = std::max(
       {s.energy_max, now.total - worst.rise, worst.body ? 0.5 * worst.body->mass * (at_rest * at_rest) : 0});
   if (worst.rise > worst.share * largest)

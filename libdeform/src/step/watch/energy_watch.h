@@ -10,9 +10,12 @@
 
 namespace dfm {
 
+struct Body;
+struct Entities;
+struct Rules;
 struct StepContext;
 struct World;
-struct Body;
+struct WorldState;
 
 // The present state of a body, J.
 struct EnergySample {
@@ -21,7 +24,7 @@ struct EnergySample {
 };
 
 // Sets the present gravity, if it varies, and books what the change does to the potentials.
-void change_gravity(World &w, Vec3 gravity);
+void change_gravity(const WorldState &state, Entities &entities, Rules &rules, Vec3 gravity);
 // Why the watch does not check the body; empty if it does.
 const char *unwatched(const World &w, const Body &b);
 // Whether its energy counts in the largest one.
