@@ -28,7 +28,7 @@ class Capture {
     const StepContext &step = *w_.steps;
     ContactProblem problem;
     problem.h = step.h;
-    problem.rest = tangent_at_rest(w_, step.h);
+    problem.rest = tangent_at_rest(w_, w_, step.h);
     problem.bond = own.tolerance.bond;
     problem.most_normal = own.tolerance.most_normal;
     each_row(own.part.contacts, [&](uint32_t i) {

@@ -20,7 +20,7 @@ void each_column(const F &f) {
   f(&ContactRows::point, 1, Per::dof);
   f(&ContactRows::block, 1, Per::dof);
   f(&ContactRows::rigid, 1, Per::side);
-  f(&ContactRows::alone, 4, Per::dof);
+  f(&ContactRows::inverse_mass, 4, Per::dof);
   f(&ContactRows::y_free, 4, Per::dof);
   f(&ContactRows::arm, 3, Per::side);
   f(&ContactRows::frame, 9, Per::row);
@@ -171,7 +171,7 @@ bool ContactProblem::take(const ContactRows &from, const RowsPart &part, const C
     if (s != kNone) s = sources[s];
     if (rows.block[d] != kNone || motions[s].n == 0) continue;
     std::fill_n(&rows.y_free[size_t{kStride} * d], kStride, 0.0);  // what moves it is its system
-    std::fill_n(&rows.alone[size_t{kStride} * d], kStride, 0.0);
+    std::fill_n(&rows.inverse_mass[size_t{kStride} * d], kStride, 0.0);
   }
   for (ContactRows::Block &b : rows.blocks)
     if (b.source != kNone) b.source = sources[b.source];

@@ -292,7 +292,7 @@ bool sub_step(World &w, StepContext &step, Buffers &r, uint32_t *trouble) {
     if (planned.role == StageRole::lists_pairs) add_lagged(w, step, r);
     // it has neither sleep nor rigid bodies nor a guard, which would have stages run again
     if (solves ? !solve(w, step, r, trouble)
-               : stage_table()[planned.row].run(w, step, trouble) != Next::stage)
+               : stage_table()[planned.row].take(w, step, trouble) != Next::stage)
       return false;
     StageTime &time = step.stage_times[planned.row];
     time.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

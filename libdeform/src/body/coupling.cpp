@@ -13,7 +13,6 @@
 
 #include "core/error.h"
 #include "deform/plugin.h"
-#include "geometry/closest.h"
 #include "geometry/rest_tree.h"
 #include "mesh/cells.h"
 
@@ -37,87 +36,10 @@ struct LocalRest {
   }
 };
 
-// a weight above -kInside is inside: a point on a face belongs to the cells on both sides
-constexpr double kInside = 1e-10;
+// Distances from cells are no smaller, over half of their length.
+constexpr double kNearest = 1e-10;
 // 64 rounding units: a weight below is zero, so that a surfel on a phyxel is that phyxel
 constexpr double kNothing = 1.4e-14;
-
-double cell_distance2(Vec3 x, const Vec3 c[4]) {
-  constexpr int kFace[4][3] = {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
-  double best = std::numeric_limits<double>::infinity();
-  for (const auto &f : kFace)
-    best = std::min(best, closest_on_triangle(x, c[f[0]], c[f[1]], c[f[2]]).distance2);
-  return best;
-}
-
-Extent cell_box(const CouplingInput &in, const LocalRest &rest, uint32_t tet) {
-  Extent box;
-  for (size_t k = 0; k < 4; ++k) box.add(rest.point[in.tet[size_t{4} * tet + k]]);
-  // points accepted by kInside may be outside by that share of the cell
-  const double more = 4 * kInside * box.longest();
-  box.grow({more, more, more});
-  return box;
-}
-
-// Barycentric coordinates of x in the tetrahedron c, refined once so that sum w c = x to rounding in cells of
-// any shape.
-void tet_weights(Vec3 x, const Vec3 c[4], double w[4]) {
-  const Vec3 e1 = c[1] - c[0], e2 = c[2] - c[0], e3 = c[3] - c[0];
-  const Vec3 n1 = cross(e2, e3), n2 = cross(e3, e1), n3 = cross(e1, e2);
-  const double inverse = 1 / dot(e1, n1);
-  const Vec3 d = x - c[0];
-  double a = dot(d, n1) * inverse, b = dot(d, n2) * inverse, g = dot(d, n3) * inverse;
-  for (int pass = 0; pass < 2; ++pass) {
-    const Vec3 r = d - (a * e1 + b * e2 + g * e3);
-    a += dot(r, n1) * inverse;
-    b += dot(r, n2) * inverse;
-    g += dot(r, n3) * inverse;
-  }
-  w[0] = 1 - (a + b + g);
-  w[1] = a;
-  w[2] = b;
-  w[3] = g;
-}
-
-// m2, of its diagonal or of the longest edge at its first corner.
-double length2(uint32_t nodes, const Vec3 *c) {
-  if (nodes != 10) return norm2(c[6] - c[0]);
-  return std::max({norm2(c[1] - c[0]), norm2(c[2] - c[0]), norm2(c[3] - c[0])});
-}
-
-// Distance of a place from the cell, in halves of the cell's length.
-double beyond(uint32_t nodes, Vec3 at) {
-  const auto above = [](double a) { return std::max(a, 0.0); };
-  if (nodes == 10) {
-    const double last = above(at.x + at.y + at.z - 1);
-    return 2 * std::sqrt(norm2(Vec3{above(-at.x), above(-at.y), above(-at.z)}) + last * last);
-  }
-  return norm(Vec3{above(std::fabs(at.x) - 1), above(std::fabs(at.y) - 1), above(std::fabs(at.z) - 1)});
-}
-
-// Place of x in the coordinates of the cell c and its shape functions there, by Newton's method from its
-// center: one step where its edges are straight and parallel. False where it does not get there, far outside
-// a distorted cell.
-bool cell_weights(uint32_t nodes, Vec3 x, const Vec3 *c, Vec3 &at, double *w) {
-  constexpr int kSteps = 20;
-  const double near2 = 1e-28 * length2(nodes, c);
-  at = nodes == 10 ? Vec3{0.25, 0.25, 0.25} : Vec3{};
-  for (int step = 0; step < kSteps; ++step) {
-    Vec3 left = x - c[0], along[3], slope[kMaxNodes];
-    cell_shapes(nodes, at, w, slope);
-    for (uint32_t k = 1; k < nodes; ++k) left -= w[k] * (c[k] - c[0]);  // c[0] may lie far away
-    if (norm2(left) <= near2) return true;
-    for (uint32_t k = 0; k < nodes; ++k) {
-      along[0] += slope[k].x * c[k];
-      along[1] += slope[k].y * c[k];
-      along[2] += slope[k].z * c[k];
-    }
-    const Vec3 n0 = cross(along[1], along[2]), n1 = cross(along[2], along[0]), n2 = cross(along[0], along[1]);
-    const double inverse = 1 / dot(along[0], n0);
-    at += inverse * Vec3{dot(left, n0), dot(left, n1), dot(left, n2)};
-  }
-  return false;
-}
 
 // Sorts a row by columns and adds up the entries of each, in the order in which they came.
 void add_up(Array<RowEntry> &row) {
@@ -130,101 +52,41 @@ void add_up(Array<RowEntry> &row) {
   std::erase_if(row, [](const RowEntry &e) { return e.weight == 0; });
 }
 
-class RestCells {
- public:
-  RestCells(const Memory &memory, const CouplingInput &in, const LocalRest &rest)
-      : in_(in), rest_(rest), tree_(memory, in.ntet, [&](uint32_t t) { return cell_box(in, rest, t); }) {}
-  // The lowest cell that contains x (away 0), else the nearest one (away: its distance, m).
-  uint32_t find(Vec3 x, double &away) const;
-  // Appends the row of a surfel at x, from the cell that find() gives; returns away.
-  double row(Vec3 x, Array<RowEntry> &out) const;
-
- private:
-  // The same from cells that are no first-order tetrahedra; false where the nearest one does not reach.
-  bool cells(Vec3 x, uint32_t nearest, double away, Array<RowEntry> &out) const;
-
-  const CouplingInput &in_;
-  const LocalRest &rest_;
-  RestTree tree_;
-};
-
-uint32_t RestCells::find(Vec3 x, double &away) const {
-  Vec3 c[4];
-  double w[4];
-  const auto corners = [&](uint32_t t) {
-    for (int k = 0; k < 4; ++k) c[k] = rest_.point[in_.tet[size_t{4} * t + size_t(k)]];
-  };
-  uint32_t cell = UINT32_MAX;
-  tree_.holding(x, [&](uint32_t t) {
-    if (t >= cell) return;
-    corners(t);
-    tet_weights(x, c, w);
-    if (std::min({w[0], w[1], w[2], w[3]}) >= -kInside) cell = t;
-  });
-  double far2 = 0;
-  if (cell == UINT32_MAX) {
-    far2 = std::numeric_limits<double>::infinity();
-    tree_.near(x, far2, [&](uint32_t t) {
-      corners(t);
-      const double d2 = cell_distance2(x, c);
-      if (d2 < far2 || (d2 == far2 && t < cell)) {
-        far2 = d2;
-        cell = t;
-      }
-    });
-  }
-  away = std::sqrt(far2);
-  return cell;
-}
-
-bool RestCells::cells(Vec3 x, uint32_t nearest, double away, Array<RowEntry> &out) const {
-  const CellKind &kind = cell_kind(in_.kind);
-  Vec3 of[kMaxNodes], at;
+// The parts of all cells near a place outside; false where the nearest one does not reach it.
+bool blend(const CellFinder &finder, const CouplingInput &in, Vec3 x, uint32_t nearest,
+           Array<RowEntry> &out) {
+  const CellKind &kind = cell_kind(in.kind);
+  Vec3 at;
   double w[kMaxNodes], all = 0;
-  // Whether x has a place in it.
-  const auto reaches = [&](uint32_t cell) {
-    for (size_t k = 0; k < kind.nodes; ++k) of[k] = rest_.point[in_.cells[kind.nodes * size_t{cell} + k]];
-    return cell_weights(kind.nodes, x, of, at, w);
-  };
   const auto add = [&](uint32_t cell, double part) {
     for (size_t k = 0; k < kind.nodes; ++k)
-      out.push_back({in_.cells[kind.nodes * size_t{cell} + k], part * w[k]});
+      out.push_back({in.cells[kind.nodes * size_t{cell} + k], part * w[k]});
     all += part;
   };
-  if (!reaches(nearest / kind.tets)) return false;
-  if (away == 0) {
-    add(nearest / kind.tets, 1);
-    return true;
-  }
-  const double far2 = length2(kind.nodes, of);
+  if (!finder.place(x, nearest, at, w)) return false;
   std::vector<uint32_t> found;
-  tree_.near(x, far2, [&](uint32_t t) { found.push_back(t / kind.tets); });
-  std::ranges::sort(found);
-  found.erase(std::unique(found.begin(), found.end()), found.end());
+  finder.near(x, finder.length2(nearest), found);
   for (const uint32_t cell : found) {
-    if (!reaches(cell)) continue;
-    const double d = beyond(kind.nodes, at);
-    if (d < 2) add(cell, (2 - d) * (2 - d) / std::max(d * d, kInside * kInside));
+    if (!finder.place(x, cell, at, w)) continue;
+    const double d = finder.beyond(at);
+    if (d < 2) add(cell, (2 - d) * (2 - d) / std::max(d * d, kNearest * kNearest));
   }
   if (!(all > 0)) {
-    reaches(nearest / kind.tets);
-    add(nearest / kind.tets, 1);
+    finder.place(x, nearest, at, w);
+    add(nearest, 1);
   }
   for (RowEntry &e : out) e.weight /= all;
   add_up(out);
   return true;
 }
 
-double RestCells::row(Vec3 x, Array<RowEntry> &out) const {
-  double away;
-  const uint32_t cell = find(x, away);
-  if (in_.cells && cells(x, cell, away, out)) return away;
-  const uint32_t *const corner = in_.tet + size_t{4} * cell;
-  Vec3 c[4];
-  double w[4];
-  for (int k = 0; k < 4; ++k) c[k] = rest_.point[corner[k]];
-  tet_weights(x, c, w);
-  for (int k = 0; k < 4; ++k) out.push_back({corner[k], w[k]});
+// Appends the row of a surfel at x; returns its distance from the cells, m.
+double add_cell_row(const CellFinder &finder, const CouplingInput &in, Vec3 x, Array<RowEntry> &out) {
+  double away, w[kMaxNodes];
+  const uint32_t tet = finder.find(x, away);
+  if (in.cells && away > 0 && blend(finder, in, x, tet / cell_kind(in.kind).tets, out)) return away;
+  const std::span<const uint32_t> nodes = finder.weights(x, tet, w);
+  for (size_t k = 0; k < nodes.size(); ++k) out.push_back({nodes[k], w[k]});
   return away;
 }
 
@@ -258,24 +120,23 @@ Coupling empty_coupling(const Memory &memory, uint32_t nsurfel) {
 }  // namespace
 
 Array<uint32_t> cells_of_surfels(const Memory &memory, const CouplingInput &in) {
-  const LocalRest rest(memory, in);
-  const RestCells cells(memory, in, rest);
+  const CellFinder finder(memory, in);
   Array<uint32_t> out(in.nsurfel, 0u, memory);
   double away;
-  for (uint32_t s = 0; s < in.nsurfel; ++s) out[s] = cells.find(rest.surfel[s], away);
+  for (uint32_t s = 0; s < in.nsurfel; ++s)
+    out[s] = finder.find(finder.local(in.surfel + size_t{3} * s), away);
   return out;
 }
 
 Coupling couple_barycentric(const Memory &memory, const CouplingInput &in) {
-  const LocalRest rest(memory, in);
-  const RestCells cells(memory, in, rest);
+  const CellFinder finder(memory, in);
   Coupling out = empty_coupling(memory, in.nsurfel);
   out.col.reserve(size_t{4} * in.nsurfel);
   out.weight.reserve(size_t{4} * in.nsurfel);
   Array<RowEntry> row(memory);
   for (uint32_t s = 0; s < in.nsurfel; ++s) {
     row.clear();
-    const double far = cells.row(rest.surfel[s], row);
+    const double far = add_cell_row(finder, in, finder.local(in.surfel + size_t{3} * s), row);
     out.outside += far > 0;
     out.farthest = std::max(out.farthest, far);
     append_row(out, row);
@@ -476,7 +337,7 @@ void restore_linear(const Array<Vec3> &point, Vec3 x, Array<RowEntry> &row) {
 template <class Occluded, class Fill>
 Coupling couple_by_reach(const Memory &memory, const CouplingInput &in, const Cloud &cloud,
                          const Occluded &occluded, const Fill &fill) {
-  std::optional<RestCells> cells;
+  std::optional<CellFinder> cells;
   Array<uint32_t> reach(memory);
   Array<RowEntry> row(memory);
   Coupling out = empty_coupling(memory, in.nsurfel);
@@ -490,8 +351,8 @@ Coupling couple_by_reach(const Memory &memory, const CouplingInput &in, const Cl
     if (sum > 0) {
       fill(x, reach, sum, row);
     } else {
-      if (!cells) cells.emplace(memory, in, cloud.rest);
-      out.farthest = std::max(out.farthest, cells->row(x, row));
+      if (!cells) cells.emplace(memory, in);
+      out.farthest = std::max(out.farthest, add_cell_row(*cells, in, x, row));
       ++out.outside;
     }
     append_row(out, row);

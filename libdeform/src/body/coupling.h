@@ -3,6 +3,7 @@
 #include <cstdint>
 
 #include "core/memory.h"
+#include "mesh/cell_finder.h"
 
 namespace dfm {
 
@@ -16,15 +17,11 @@ struct Coupling {
   double farthest = 0;  // m, distance of the farthest such surfel from its cell
 };
 
-// Input of couplings, all at rest, m.
-struct CouplingInput {
-  uint32_t npoint = 0, ntet = 0, nsurfel = 0;
-  const double *point = nullptr;    // [npoint,3]
-  const uint32_t *tet = nullptr;    // [ntet,4]
-  const double *surfel = nullptr;   // [nsurfel,3]
-  const uint32_t *cells = nullptr;  // their nodes, where the tetrahedra are those of other cells
-  uint32_t kind = 0;                // DFM_CELL_* of these
-  double support = 3;               // mean distances to the ten nearest phyxels
+// Input of couplings, all at rest.
+struct CouplingInput : CellsAtRest {
+  uint32_t nsurfel = 0;
+  const double *surfel = nullptr;  // [nsurfel,3] m
+  double support = 3;              // mean distances to the ten nearest phyxels
 };
 
 // [nsurfel] the lowest cell that contains each surfel, else the nearest one.

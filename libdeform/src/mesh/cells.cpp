@@ -198,6 +198,26 @@ void cell_shapes(uint32_t nodes, Vec3 at, double *value, Vec3 *slope) {
   }
 }
 
+bool is_inverted(const CellKind &kind, const double *points, size_t stride, const uint32_t *cell) {
+  const auto inverts = [&](double x, double y, double z) {
+    return jacobian(kind.nodes, points, stride, cell, {x, y, z}) < 0;
+  };
+  if (kind.nodes == 10) {
+    constexpr double k = 1.0 / 3;
+    constexpr double kAt[][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1},
+                                 {k, k, k}, {0, k, k}, {k, 0, k}, {k, k, 0}};
+    return std::ranges::any_of(kAt, [&](const double *at) { return inverts(at[0], at[1], at[2]); });
+  }
+  constexpr double kTwo[] = {-0.577350269189625765, 0.577350269189625765},
+                   kThree[] = {-0.774596669241483377, 0, 0.774596669241483377};
+  const std::span<const double> along = kind.nodes == 8 ? std::span<const double>(kTwo) : kThree;
+  for (const double x : along)
+    for (const double y : along)
+      for (const double z : along)
+        if (inverts(x, y, z)) return true;
+  return false;
+}
+
 bool inverted_inside(const double *points, size_t stride, const uint32_t *cell, const double *inside) {
   Vec3 sum;
   double all = 0;

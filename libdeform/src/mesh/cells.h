@@ -48,7 +48,11 @@ Vec3 inside_place(uint32_t point);
 // Shape functions of a cell of 8, 10, 20 or 27 nodes at a place in its coordinates, and their derivatives by
 // these: -1 to 1 in a hexahedron; in a tetrahedron 0 to 1 along the edges at its first corner.
 void cell_shapes(uint32_t nodes, Vec3 at, double *value, Vec3 *slope);
-// Whether the material of a cell is turned inside out, in its middle.
+// Whether a cell of more than four nodes is inverted at one of the points at which models integrate: corners
+// and centers of faces of a tetrahedron, those of Gauss in a hexahedron. Parts between nodes may fold beside
+// them.
+bool is_inverted(const CellKind &kind, const double *points, size_t stride, const uint32_t *cell);
+// The same of a cell that is in part material, in the middle of that.
 bool inverted_inside(const double *points, size_t stride, const uint32_t *cell, const double *inside);
 // Calls use(volume, place) for each: the sum of volume f(place) is the integral over the material.
 void each_inside(const double *points, size_t stride, const uint32_t *cell, const double *inside,

@@ -477,20 +477,25 @@ class Builder {
     }
   }
 
-  // The cell that contains a point of the body at rest, or the nearest one if the point is close to it.
-  void locate_near(const double point[3], const std::string &pointer, const std::string &name,
-                   const BodyMesh &mesh, uint32_t corners[4], double weights[4]) const {
-    const double away = locate(mesh, point, corners, weights);
+  // The tetrahedron that contains a point of the body at rest, or the nearest one if the point is close to
+  // it.
+  uint32_t find_near(const double point[3], const std::string &pointer, const std::string &name,
+                     const BodyMesh &mesh) const {
+    double away;
+    const uint32_t tet = mesh.finder().find(mesh.finder().local(point), away);
     if (!(away <= 0.25 * mesh.size))
       def_.refuse(pointer + "/point",
                   format("lies %g m away from \"%s\"; ", away, name.c_str()) + span_of(mesh));
+    return tet;
   }
 
   void add_spring(dfm_body body, const Spring &s, const std::string &name, const BodyMesh &mesh) const {
-    std::vector<uint32_t> points(4);
+    std::vector<uint32_t> points;
     std::vector<double> weights(4);
     if (s.at_point) {
-      locate_near(s.point, s.pointer, name, mesh, points.data(), weights.data());
+      const uint32_t tet = find_near(s.point, s.pointer, name, mesh);
+      points.assign(mesh.info.tets + 4 * size_t{tet}, mesh.info.tets + 4 * size_t{tet} + 4);
+      mesh.finder().corner_weights(mesh.finder().local(s.point), tet, weights.data());
       // a point outside the body acts on the nearest place of the cell
       for (double &w : weights) w = std::max(w, 0.0);
     } else {
@@ -536,9 +541,9 @@ class Builder {
     ProbePoint probe;
     probe.name = p.name;
     probe.body = body;
-    uint32_t points[4];
-    locate_near(p.point, p.pointer, p.body, mesh, points, probe.weights);
-    while (!std::equal(points, points + 4, mesh.info.tets + 4 * size_t(probe.cell))) ++probe.cell;
+    probe.tet = find_near(p.point, p.pointer, p.body, mesh);
+    double w[kMaxNodes];
+    probe.weights.assign(w, w + mesh.finder().weights(mesh.finder().local(p.point), probe.tet, w).size());
     // Probes are reported in the scene's order, whatever the order of their bodies.
     if (probes_.size() < def_.probes.size()) probes_.resize(def_.probes.size());
     probes_[size_t(&p - def_.probes.data())] = std::move(probe);

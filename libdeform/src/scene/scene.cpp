@@ -5,6 +5,7 @@
 
 #include "core/error.h"
 #include "core/handle.h"
+#include "mesh/cells.h"
 #include "plugin/context.h"
 #include "scene/build.h"
 #include "scene/device.h"
@@ -69,16 +70,19 @@ dfm_world Scene::release_world() { return std::exchange(world_, 0); }
 
 namespace {
 
-// The four points of a cell as they are numbered now: a cut gives cells and points new numbers. Null: the
-// body does not have the cell.
-const uint32_t *points_of(const dfm::Body &b, uint32_t cell) {
+// The points of a probe as they are numbered now: a cut gives cells and points new numbers. Null: the body
+// does not have its cell.
+const uint32_t *points_of(const dfm::Body &b, const ProbePoint &probe) {
   if (b.emptied || b.rolled_back) return nullptr;
+  uint32_t tet = probe.tet;
   if (b.cut.whole) {
-    const auto at = std::ranges::find(b.cut.cell, cell);
+    const auto at = std::ranges::find(b.cut.cell, tet);
     if (at == b.cut.cell.end()) return nullptr;
-    cell = uint32_t(at - b.cut.cell.begin());
+    tet = uint32_t(at - b.cut.cell.begin());
   }
-  return &b.tets[4 * size_t{cell}];
+  if (probe.weights.size() == 4) return &b.tets[4 * size_t{tet}];
+  const CellKind &kind = cell_kind(b.cell_type);
+  return &b.cells[kind.nodes * size_t{tet / kind.tets}];
 }
 
 }  // namespace
@@ -86,11 +90,11 @@ const uint32_t *points_of(const dfm::Body &b, uint32_t cell) {
 dfm::Body *Scene::probe_body(size_t i, const uint32_t *&points) const {
   const ProbePoint &p = probes_[i];
   dfm::Body &own = resolve<dfm::Body>(Kind::body, p.body);
-  points = points_of(own, p.cell);
+  points = points_of(own, p);
   if (points) return &own;
   for (dfm::Body *const other : all_bodies(*own.world)) {
     if (other->piece_of != own.id) continue;
-    points = points_of(*other, p.cell);
+    points = points_of(*other, p);
     if (points) return other;
   }
   return nullptr;
@@ -102,7 +106,7 @@ void Scene::probe_state(size_t i, double position[3], double velocity[3]) const 
   const double none = b ? 0 : std::numeric_limits<double>::quiet_NaN();
   Vec3 x{none, none, none}, v = x;
   if (b) b->dynamics->see_points();
-  for (uint32_t c = 0; b && c < 4; ++c) {
+  for (size_t c = 0; b && c < probes_[i].weights.size(); ++c) {
     x += probes_[i].weights[c] * b->p.x_at(points[c]);
     v += probes_[i].weights[c] * b->p.v_at(points[c]);
   }

@@ -15,8 +15,8 @@ namespace dfm::scene {
 struct ProbePoint {
   std::string name;
   dfm_body body = 0;
-  uint32_t cell = 0;  // its number when the body was made
-  double weights[4] = {};
+  uint32_t tet = 0;             // its number when the body was made
+  std::vector<double> weights;  // of its corners, or of the nodes of the cell that it is a part of
 };
 
 class Scene {
@@ -32,7 +32,8 @@ class Scene {
   const Definition &definition() const { return definition_; }
   size_t probe_count() const { return probes_.size(); }
   const ProbePoint &probe(size_t i) const { return probes_[i]; }
-  // Which has the probe's cell, the body or a piece of it, and the cell's four points there; null: none has.
+  // Which has the probe's cell, the body or a piece of it, and the points that its weights are of; null: none
+  // has.
   dfm::Body *probe_body(size_t i, const uint32_t *&points) const;
   // NAN where none has.
   void probe_state(size_t i, double position[3], double velocity[3]) const;

@@ -40,9 +40,12 @@ std::string span_of(const BodyMesh &mesh) {
                 mesh.lo[0], mesh.lo[1], mesh.lo[2], mesh.hi[0], mesh.hi[1], mesh.hi[2]);
 }
 
-double locate(const BodyMesh &mesh, const double point[3], uint32_t corners[4], double weights[4]) {
-  if (!mesh.locator) mesh.locator = std::make_shared<const Locator>(mesh);
-  return mesh.locator->find(point, corners, weights);
+const CellFinder &BodyMesh::finder() const {
+  if (!cells_found)
+    cells_found = std::make_shared<const CellFinder>(
+        Memory::standard(),
+        CellsAtRest{info.npoint, info.ntet, points.data(), info.tets, info.cells, info.cell});
+  return *cells_found;
 }
 
 namespace {
@@ -113,20 +116,15 @@ std::vector<uint8_t> skin_marks(const Selection &where, const BodyMesh &mesh) {
 // f(point, weight) for those that a point of the skin follows, as in the body's coupling.
 template <class F>
 void each_point_of(const BodyMesh &mesh, uint32_t s, F f) {
-  if (mesh.info.cells) {
-    if (!mesh.rows) {
-      const CouplingInput in{mesh.info.npoint, mesh.info.ntet,          mesh.skin.npoint, mesh.points.data(),
-                             mesh.info.tets,   mesh.skin.points.data(), mesh.info.cells,  mesh.info.cell};
-      mesh.rows = std::make_shared<const Coupling>(couple_barycentric(Memory::standard(), in));
-    }
-    for (uint32_t k = mesh.rows->row[s]; k < mesh.rows->row[s + 1]; ++k)
-      f(mesh.rows->col[k], mesh.rows->weight[k]);
-    return;
+  if (!mesh.rows) {
+    const CouplingInput in{{mesh.info.npoint, mesh.info.ntet, mesh.points.data(), mesh.info.tets,
+                            mesh.info.cells, mesh.info.cell},
+                           mesh.skin.npoint,
+                           mesh.skin.points.data()};
+    mesh.rows = std::make_shared<const Coupling>(couple_barycentric(Memory::standard(), in));
   }
-  uint32_t corners[4];
-  double weights[4];
-  locate(mesh, &mesh.skin.points[3 * size_t(s)], corners, weights);
-  for (int k = 0; k < 4; ++k) f(corners[k], weights[k]);
+  for (uint32_t k = mesh.rows->row[s]; k < mesh.rows->row[s + 1]; ++k)
+    f(mesh.rows->col[k], mesh.rows->weight[k]);
 }
 
 // Marks the points that the skin's marked ones follow: the corners of their cells, or of the face or edge on
@@ -214,11 +212,11 @@ std::vector<double> share_by_mass(const std::vector<uint32_t> &points, const Bod
   std::vector<double> weights(points.size(), 0.0);
   for (uint32_t c = 0; c < mesh.info.ntet; ++c) {
     const uint32_t *t = mesh.info.tets + 4 * size_t(c);
-    const double *const p = mesh.points.data();
-    const double *const corner[4] = {p + 3 * size_t(t[0]), p + 3 * size_t(t[1]), p + 3 * size_t(t[2]),
-                                     p + 3 * size_t(t[3])};
-    const double quarter =
-        std::fabs(volume6(corner)) / 24 * (mesh.cell_weight.empty() ? 1 : mesh.cell_weight[c]);
+    const auto from_first = [&](int k) {
+      return load3(&mesh.points[3 * size_t(t[k])]) - load3(&mesh.points[3 * size_t(t[0])]);
+    };
+    const double volume6 = dot(from_first(1), cross(from_first(2), from_first(3)));
+    const double quarter = std::fabs(volume6) / 24 * (mesh.cell_weight.empty() ? 1 : mesh.cell_weight[c]);
     for (int k = 0; k < 4; ++k)
       if (rank[t[k]] != UINT32_MAX) weights[rank[t[k]]] += quarter;
   }

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "scene/defs.h"
-#include "scene/locate.h"
+#include "mesh/cell_finder.h"
 
 namespace dfm {
 struct Coupling;
@@ -31,10 +31,11 @@ struct BodyMesh {
   Skin skin;                   // npoint 0: none
   // [ntet] mass per volume of each cell relative to the others; empty: the same
   std::vector<double> cell_weight;
-  double lo[3] = {}, hi[3] = {}, size = 0;         // of the scaled points; size: diagonal
-  mutable std::shared_ptr<const Locator> locator;  // made at first use, as the next one
-  mutable std::shared_ptr<const Coupling> rows;    // of the skin, on hexahedra
+  double lo[3] = {}, hi[3] = {}, size = 0;                // of the scaled points; size: diagonal
+  mutable std::shared_ptr<const CellFinder> cells_found;  // made at first use, as the next one
+  mutable std::shared_ptr<const Coupling> rows;           // of the skin
 
+  const CellFinder &finder() const;
   double share_of(uint32_t tet) const;  // of its volume, that is material
 };
 
@@ -67,8 +68,5 @@ Shared share_on_skin(const std::vector<uint32_t> &triangles, const BodyMesh &mes
 Shared share(const Force &force, const BodyMesh &mesh, const std::string &file);
 
 std::string span_of(const BodyMesh &mesh);  // for errors
-
-// see Locator::find
-double locate(const BodyMesh &mesh, const double point[3], uint32_t corners[4], double weights[4]);
 
 }  // namespace dfm::scene

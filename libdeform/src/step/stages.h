@@ -55,8 +55,13 @@ struct Stage {
   const char *cost;                              // what its cost grows with
   StageChoice (*when)(const SceneFacts &facts);  // whether it runs, and why
   StageRole role = StageRole::none;
-  // of what observes its result and steers nothing: false: the sub-step fails
+  // Observes the result and steers nothing. False: the sub-step fails.
   bool (*check)(World &w, StepContext &step, uint32_t *trouble) = nullptr;
+
+  Next take(World &w, StepContext &step, uint32_t *trouble) const {
+    const Next next = run(w, step, trouble);
+    return next == Next::stage && check ? go_on(check(w, step, trouble)) : next;
+  }
 };
 std::span<const Stage> stage_table();
 Plan make_plan(const SceneFacts &facts);  // throws Error if nothing provides a requested effect
@@ -140,6 +145,8 @@ bool find_ends(World &w, StepContext &step, uint32_t *trouble);
 void keep_rigids(World &w, StepContext &step);  // after the sub-step has succeeded
 
 // solve.cpp
+// Makes rows from contacts, with their stored data.
+bool make_rows(World &w, StepContext &step, uint32_t *trouble);
 // m, of a depth: the part that the contact was found with, less what has opened of it. It counts as distance.
 // match: of the contact in the store; kNone: the most that its pair has left.
 double start_depth(const World &w, const StepContext &step, const ContactPoint &c, uint32_t match,

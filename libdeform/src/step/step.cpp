@@ -115,8 +115,7 @@ Next run(size_t row, World &w, StepContext &step, uint32_t *trouble, Clock::time
   };
   w.context->trace_begin(stage.name);
   const Timer timer{stage, w, step.stage_times[row], since};
-  const Next next = stage.run(w, step, trouble);
-  return next == Next::stage && stage.check ? go_on(stage.check(w, step, trouble)) : next;
+  return stage.take(w, step, trouble);
 }
 
 bool advance(World &w, StepContext &step, double end, double goal, bool last, uint32_t *trouble);

@@ -22,11 +22,16 @@
 namespace dfm {
 
 uint32_t inverted_cells(const Body &b) {
-  if (b.inside.empty()) return points_kernels().inverted(b.ncell(), b.tets.data(), b.p.x.data());
+  const double *const x = b.p.x.data();
+  if (b.cells.empty()) return points_kernels().inverted(b.ncell(), b.tets.data(), x);
+  const CellKind &kind = cell_kind(b.cell_type);
   uint32_t n = 0;
-  for (size_t c = 0; c < b.inside.size() / kInsidePoints; ++c)
-    n += inverted_inside(b.p.x.data(), kStride, &b.cells[8 * c], &b.inside[kInsidePoints * c]);
-  return n * cell_kind(b.cell_type).tets;
+  for (size_t c = 0; c < b.cells.size() / kind.nodes; ++c) {
+    const uint32_t *const cell = &b.cells[kind.nodes * c];
+    n += b.inside.empty() ? is_inverted(kind, x, kStride, cell)
+                          : inverted_inside(x, kStride, cell, &b.inside[kInsidePoints * c]);
+  }
+  return n * kind.tets;
 }
 
 namespace {

@@ -34,7 +34,7 @@ struct Groove {
     rows.weight = {1, 1};
     rows.block = {kNone};
     rows.y = {speed[0], speed[1], speed[2], 0};
-    rows.alone = {1, 1, 1, 0};
+    rows.inverse_mass = {1, 1, 1, 0};
     rows.y_free = rows.y;
     // normal, a tangent that points away from the other wall, the third one
     rows.frame = {s, 0, s, s, 0, -s, 0, 1, 0, -s, 0, s, -s, 0, -s, 0, -1, 0};

@@ -3,10 +3,12 @@
 
 #include <map>
 #include <numeric>
+#include <random>
 #include <set>
 
 #include "deform/plugin.h"
 #include "math/vec3.h"
+#include "mesh/cell_finder.h"
 #include "mesh/raw_mesh.h"
 #include "mesh_support.h"
 
@@ -113,6 +115,65 @@ TEST_P(Cells, Files_GiveBackCellsGroupsAndPoints) {
     EXPECT_EQ(back.tet_group, mesh.tet_group) << ending;
     EXPECT_TRUE(back.warnings.empty()) << ending << ": " << back.warnings[0];
   }
+}
+
+// A cell is inverted where its mapping is, not where the straight parts between its nodes are. A corner of a
+// hexahedron of 20 points that is pushed in beyond the middles of its edges folds the part there. The
+// Jacobian stays positive at all points of integration until the corner is a fifth of the diagonal inside.
+TEST_P(Cells, AreInverted_WhereTheirMappingIs) {
+  const CellKind &kind = cell_kind(GetParam());
+  RestMesh mesh = made(GetParam());
+  const uint32_t *const cell = mesh.cells.data();
+  EXPECT_FALSE(is_inverted(kind, mesh.points.data(), 3, cell));
+  Array<double> mirrored = mesh.points;
+  for (size_t i = 0; i < mirrored.size(); i += 3) mirrored[i] *= -1;
+  EXPECT_TRUE(is_inverted(kind, mirrored.data(), 3, cell));
+  if (GetParam() != DFM_CELL_HEX20) return;
+  const auto pushed = [&](double share) {  // of the cell's diagonal
+    Array<double> points = mesh.points;
+    for (size_t k = 0; k < 3; ++k)
+      points[3 * size_t{cell[0]} + k] +=
+          share * (mesh.points[3 * size_t{cell[6]} + k] - mesh.points[3 * size_t{cell[0]} + k]);
+    return points;
+  };
+  const Array<double> folded = pushed(0.18), inverted = pushed(0.25);
+  uint32_t parts = 0;
+  for (uint32_t t = 0; t < kind.tets; ++t) {
+    const uint32_t *const q = &mesh.tets[4 * size_t{t}];
+    const auto at = [&](int k) { return load3(&folded[3 * size_t{q[k]}]); };
+    parts += dot(at(1) - at(0), cross(at(2) - at(0), at(3) - at(0))) < 0;
+  }
+  EXPECT_GT(parts, 0u);
+  EXPECT_FALSE(is_inverted(kind, folded.data(), 3, cell));
+  EXPECT_TRUE(is_inverted(kind, inverted.data(), 3, cell));
+}
+
+// A quadratic field over the nodes of second-order cells has its own value at every place, in the cells and
+// outside; a linear one over those of the others.
+TEST_P(Cells, Finder_FollowsTheFieldsOfTheCells) {
+  const RestMesh mesh = made(GetParam());
+  const bool quadratic = GetParam() != DFM_CELL_HEX8;
+  const auto field = [&](Vec3 x) {
+    const double linear = 0.3 + 2 * x.x - x.y + 0.5 * x.z;
+    return quadratic ? linear + 7 * x.x * x.y - 3 * x.z * x.z + x.y * x.z : linear;
+  };
+  const CellFinder finder(kMemory, {mesh.npoint(), mesh.ntet(), mesh.points.data(), mesh.tets.data(),
+                                    mesh.cells.data(), mesh.cell});
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> along(-0.02, 0.32), across(-0.02, 0.22);
+  uint32_t outside = 0;
+  for (int n = 0; n < 200; ++n) {
+    const double place[3] = {along(random), across(random), across(random)};
+    double away, w[kMaxNodes], value = 0;
+    const uint32_t tet = finder.find(finder.local(place), away);
+    const std::span<const uint32_t> nodes = finder.weights(finder.local(place), tet, w);
+    ASSERT_EQ(nodes.size(), cell_kind(mesh.cell).nodes);
+    for (size_t k = 0; k < nodes.size(); ++k)
+      value += w[k] * field(load3(&mesh.points[3 * size_t{nodes[k]}]));
+    EXPECT_NEAR(value, field(load3(place)), 1e-12);
+    outside += away > 0;
+  }
+  EXPECT_GT(outside, 0u);
 }
 
 // Their sum is 1, that of the slopes 0, and each is 1 at its node.

@@ -184,16 +184,20 @@ TEST(Share, FaceOfACube_GetsTheConsistentLoad) {
   // 1 and 7 belong to four cells, 3 and 5 to one
   EXPECT_NEAR(m[0] / m[1], (3 * 1.0 / 6 + 1.0 / 3) / (1.0 / 6), 1e-12);
 
-  uint32_t corners[4];
-  double weights[4];
+  const dfm::CellFinder &finder = mesh.finder();
+  double weights[4], away;
   const double inside[3] = {0.1, 0.1, 0.1}, outside[3] = {1.5, 0.5, 0.5};
-  EXPECT_LE(locate(mesh, inside, corners, weights), 0);
+  const uint32_t tet = finder.find(finder.local(inside), away);
+  EXPECT_EQ(away, 0);
+  finder.corner_weights(finder.local(inside), tet, weights);
   for (int k = 0; k < 3; ++k) {
     double x = 0;
-    for (int c = 0; c < 4; ++c) x += weights[c] * mesh.points[3 * corners[c] + size_t(k)];
+    for (size_t c = 0; c < 4; ++c)
+      x += weights[c] * mesh.points[3 * size_t(mesh.info.tets[4 * size_t{tet} + c]) + size_t(k)];
     EXPECT_NEAR(x, inside[k], 1e-15);
   }
-  EXPECT_NEAR(locate(mesh, outside, corners, weights), 0.5, 1e-12);
+  finder.find(finder.local(outside), away);
+  EXPECT_NEAR(away, 0.5, 1e-12);
 }
 
 TEST(Nodal, Table_IsReadByFileNumbers) {

@@ -44,14 +44,14 @@ double one_cell(const BodyMesh &all, uint32_t cell, const double *point) {
   one.info.npoint = 4;
   one.info.tets = own;
   one.info.ntet = 1;
-  uint32_t corners[4];
-  double weights[4];
-  return Locator(one).find(point, corners, weights);
+  double away;
+  one.finder().find(one.finder().local(point), away);
+  return away;
 }
 
 }  // namespace
 
-TEST(Locator, FindsTheCellThatASearchThroughAllFinds) {
+TEST(CellFinder, FindsTheCellThatASearchThroughAllFinds) {
   const dfm::Memory &memory = dfm::Memory::standard();
   for (int shape = 0; shape < 3; ++shape) {
     const Cells c(shape == 0   ? dfm::make_ball(memory, 1, 200)
@@ -63,12 +63,15 @@ TEST(Locator, FindsTheCellThatASearchThroughAllFinds) {
       double point[3], least = INFINITY;
       for (int k = 0; k < 3; ++k) point[k] = c.body.lo[k] + in(random) * (c.body.hi[k] - c.body.lo[k]);
       for (uint32_t t = 0; t < c.body.info.ntet; ++t) least = std::min(least, one_cell(c.body, t, point));
-      uint32_t corners[4];
-      double weights[4], sum = 0;
-      EXPECT_EQ(locate(c.body, point, corners, weights), least) << shape << " " << n;
+      const dfm::CellFinder &finder = c.body.finder();
+      double weights[4], away, sum = 0;
+      const uint32_t tet = finder.find(finder.local(point), away);
+      finder.corner_weights(finder.local(point), tet, weights);
+      EXPECT_NEAR(away, least, 1e-12) << shape << " " << n;
       for (int k = 0; k < 3; ++k) {
         double x = 0;
-        for (int i = 0; i < 4; ++i) x += weights[i] * c.body.points[3 * size_t(corners[i]) + size_t(k)];
+        for (size_t i = 0; i < 4; ++i)
+          x += weights[i] * c.body.points[3 * size_t(c.body.info.tets[4 * size_t{tet} + i]) + size_t(k)];
         EXPECT_NEAR(x, point[k], 1e-10);
       }
       for (double w : weights) sum += w;
@@ -127,11 +130,13 @@ TEST(SelectOnFilled, Box_TakesTheSurfaceInIt) {
   c.body.filled = true;
   const std::vector<uint32_t> points = select(where, c.body, "s.json");
   ASSERT_EQ(points.size(), 4u);
+  double away;
+  const uint32_t tet = c.body.finder().find(c.body.finder().local(skin.points.data()), away);
   uint32_t corners[4];
-  double weights[4];
-  locate(c.body, skin.points.data(), corners, weights);
+  std::copy_n(c.body.info.tets + 4 * size_t{tet}, 4, corners);
   std::sort(corners, corners + 4);
   for (int k = 0; k < 4; ++k) EXPECT_EQ(points[size_t(k)], corners[k]);
   skin.points = {0.3, 0.3, 0.31};  // on a face
+  c.body.rows = nullptr;
   EXPECT_EQ(select(where, c.body, "s.json").size(), 3u);
 }

@@ -112,8 +112,6 @@ void stage_distribute(const Detection &detection, const Solution &solution, SubS
   report_impulses(detection, solution, end);
 }
 
-namespace {
-
 // Makes rows of the contacts, with the impulses of the last sub-step, which are not applied yet.
 bool make_rows(World &w, StepContext &step, uint32_t *trouble) {
   const uint32_t n = static_cast<uint32_t>(step.contacts.size());
@@ -175,6 +173,8 @@ bool make_rows(World &w, StepContext &step, uint32_t *trouble) {
   step.solve_islands->find(w, step);
   return true;
 }
+
+namespace {
 
 // Solves again, from the present impulses, until rigid bodies turn and drive as the solve assumed. bad: out,
 // an island with a law that fails. False: a rigid host has failed.
