@@ -16,8 +16,8 @@ struct CellsAtRest {
   uint32_t kind = 0;                // DFM_CELL_* of these
 };
 
-// Places are relative to the first point: differences of neighbors are exact, so that weights do not depend on
-// the distance from the origin of the world.
+// Places are relative to the first point: differences of neighbors are exact, so that weights do not depend
+// on the distance from the origin of the world.
 class CellFinder {
  public:
   CellFinder(const Memory &memory, const CellsAtRest &cells);
@@ -26,8 +26,8 @@ class CellFinder {
   uint32_t find(Vec3 x, double &away) const;
   // Barycentric coordinates of x in a tetrahedron, also outside.
   void corner_weights(Vec3 x, uint32_t tet, double w[4]) const;
-  // Place of x in the coordinates of a cell that is no first-order tetrahedron, and its shape functions there.
-  // False where Newton's method does not get there, far outside a distorted cell.
+  // Place of x in the coordinates of a cell that is no first-order tetrahedron, and its shape functions
+  // there. False where Newton's method does not get there, far outside a distorted cell.
   bool place(Vec3 x, uint32_t cell, Vec3 &at, double *w) const;
   // The nodes of the tetrahedron's cell and their shape functions at x; corners of the tetrahedron where the
   // cell has no such place. w: [kMaxNodes]
