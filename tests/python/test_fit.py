@@ -100,6 +100,51 @@ class Recovery(InAFolder):
         self.assertAlmostEqual(found.values["mu"] / TRUTH["mu"], 1, delta=5e-3)
 
 
+class Material(unittest.TestCase):
+    """A bar hangs by its end and rings under its weight: the sag gives E, how thin it becomes nu, the decay
+    the damping."""
+    TRUTH = {"young": 4e5, "nu": 0.31, "damping": 0.004}
+    START = {"young": 1e6, "nu": 0.2, "damping": 0.001}
+
+    def test_modulus_poisson_and_damping_come_back(self):
+        folder = pathlib.Path(tempfile.mkdtemp())
+        self.addCleanup(shutil.rmtree, folder)
+        scene = folder / "bar.json"
+        scene.write_text(json.dumps({
+            "format": "deform-scene", "version": 1, "gravity": [9.81, 0, 0],
+            "time": {"duration": 0.2, "step": 0.002},
+            "materials": {"rubber": {
+                "density": 1000, "young": self.TRUTH["young"], "poisson": self.TRUTH["nu"],
+                "damping": {"stiffness": self.TRUTH["damping"]}}},
+            "bodies": [{"name": "bar", "mesh": str(EXAMPLES.parent / "data" / "beam.msh"),
+                        "material": "rubber", "model": {"type": "linear_fem"},
+                        "fix": [{"box": [[-0.001, -1, -1], [0.001, 1, 1]]}]}],
+            "probes": [{"name": "tip", "body": "bar", "point": [0.5, 0.05, 0.05]},
+                       {"name": "side", "body": "bar", "point": [0.1, 0.1, 0.05]}],
+            "output": {"every": 0.01}}))
+        deform.command("run", scene, "--quiet", "--out", folder / "run")
+        residuals = []
+        for probe, column, sigma in ("tip", "x", 1e-4), ("side", "y", 1e-6):
+            with open(folder / "run" / "probes.csv", newline="") as file:
+                rows = [f"{row['t']},{row[column]}" for row in csv.DictReader(file) if row["probe"] == probe]
+            measured = folder / f"{probe}.csv"
+            measured.write_text("\n".join([f"t,{column}", *rows, ""]))
+            residuals.append({"name": probe, "table": "probes", "where": {"probe": probe}, "column": column,
+                              "sigma": sigma, "measured": str(measured), "columns": ["t", column]})
+        at = "/materials/rubber/"
+        found = deform.fit({
+            "format": "deform-study", "version": 1, "scene": str(scene),
+            "parameters": {
+                "young": {"at": at + "young", "from": 1e5, "to": 4e6, "scale": "log",
+                          "start": self.START["young"]},
+                "nu": {"at": at + "poisson", "from": 0.05, "to": 0.45, "start": self.START["nu"]},
+                "damping": {"at": at + "damping/stiffness", "from": 2e-4, "to": 2e-2, "scale": "log",
+                            "start": self.START["damping"]}},
+            "residuals": residuals}, workers=2)
+        for name, true in self.TRUTH.items():
+            self.assertAlmostEqual(found.values[name] / true, 1, delta=5e-3, msg=name)
+
+
 class Said(InAFolder):
     def test_what_cannot_be_told_apart(self):
         mass = "/rigid/bodies/0/mass"

@@ -4,6 +4,7 @@ import csv
 import importlib.util
 import io
 import json
+import math
 import os
 import pathlib
 import random
@@ -23,7 +24,7 @@ import deform
 from deform._library import clear_own, refuse_foreign
 from deform.study import __main__ as command_line, plots
 from deform.study.design import points
-from deform.study.engine import Engine, Failed, Results
+from deform.study.engine import Engine, Failed, Results, take
 from deform.study.executors import Dask
 from deform.study.spec import read_study
 from deform.study.sweep import task_of
@@ -350,6 +351,16 @@ class Runs(InAFolder):
         self.assertAlmostEqual(stops[1], 1 / (2 * 0.5 * 10), delta=1e-3)
 
 
+class Take(unittest.TestCase):
+    def test_a_column_as_one_number(self):
+        t = [0.1 * i for i in range(41)]
+        wave = [3 + 2 * math.sin(2 * math.pi * x / 0.8) for x in t]
+        for how, value in (("first", 3), ("last", wave[-1]), ("min", 1), ("max", 5), ("mean", sum(wave) / 41),
+                           ("change", wave[-1] - 3), ("peak_to_peak", 4), ("period", 0.8)):
+            self.assertAlmostEqual(take(wave, how, t), value, delta=2e-3, msg=how)
+        self.assertTrue(math.isnan(take([0.0, 1.0], "period", t)))
+
+
 class Kills(InAFolder):
     def test_killed_workers_lose_nothing(self):
         """200 runs; a worker or its run is killed after every 20th result."""
@@ -588,6 +599,26 @@ class Outputs(InAFolder):
                 deform.sweep(study, out=self.folder / "other", executor="dask", address="tcp://127.0.0.1:1")
         with Dask(1) as pool, self.assertRaisesRegex(deform.Error, "Dask cannot make runs: KeyError"):
             list(pool.map([{}]))
+
+    def test_a_killed_worker_of_a_cluster_loses_nothing(self):
+        """Through the address of a scheduler; the cluster starts another worker."""
+        if importlib.util.find_spec("distributed") is None:
+            return
+        import distributed
+        study = sweep_study(self.scene, design={"method": "sobol", "runs": 40})
+        killed = []
+        with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+            def add(progress, failed):
+                progress.done += 1
+                if progress.done == 10:
+                    killed.append(next(iter(cluster.workers.values())).pid)
+                    os.kill(killed[0], signal.SIGKILL)
+
+            with unittest.mock.patch("deform.study.progress.Progress.add", add):
+                rows = deform.sweep(study, out=self.out, executor="dask", address=cluster.scheduler_address)
+        self.assertEqual(len(killed), 1)
+        self.assertEqual((rows.failed, len(rows.done)), ([], 40))
+        self.assertEqual(len({row["slid"] for row in rows}), 40)
 
     def test_options_that_would_be_ignored(self):
         self.assertIn("address is of the executor dask",
