@@ -1,4 +1,4 @@
-// Contacts of the sub-step, without impossible depths. A contact of a sleeping body wakes its island.
+// Contacts of the sub-step, without impossible depths, and the sleeping bodies that they meet, which will wake.
 #include <algorithm>
 
 #include "narrow/narrow_phase.h"
