@@ -1,4 +1,4 @@
-// Contacts of the sub-step, without impossible depths, and the sleeping bodies that they meet, which will wake.
+// Contacts of the sub-step, without impossible depths, and the sleeping bodies that they meet: these wake.
 #include <algorithm>
 
 #include "narrow/narrow_phase.h"
