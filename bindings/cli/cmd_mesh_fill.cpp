@@ -40,24 +40,12 @@ void measure(Filled &out) {
 }
 
 void print_json(const std::string &in, const std::string &file, uint32_t wanted, const Filled &f) {
-  const auto whole = [](uint64_t n) { return std::to_string(n); };
   JsonObject out;
-  out.add("surface", quoted(in))
-      .add("file", quoted(file))
-      .add("triangles", whole(f.surface.ntriangle))
-      .add("wanted", whole(wanted));
-  out.add("cells", whole(f.cells.ntet))
-      .add("points", whole(f.cells.npoint))
-      .add("pieces", whole(f.cells.npiece));
-  out.add("enclosed_volume", number(f.volume))
-      .add("cells_volume", number(f.cells.volume))
-      .add("mean_share", number(f.mean_share));
-  out.add("least_share", number(f.least_share))
-      .add("edge_median", number(f.cells.edge_median))
-      .add("seconds", number(f.seconds));
-  out.add("open_edges", whole(f.surface.open_edges))
-      .add("holes", whole(f.surface.holes))
-      .add("turned", whole(f.surface.turned));
+  out.add("surface", quoted(in), "file", quoted(file), "triangles", f.surface.ntriangle, "wanted", wanted);
+  out.add("cells", f.cells.ntet, "points", f.cells.npoint, "pieces", f.cells.npiece);
+  out.add("enclosed_volume", f.volume, "cells_volume", f.cells.volume, "mean_share", f.mean_share);
+  out.add("least_share", f.least_share, "edge_median", f.cells.edge_median, "seconds", f.seconds);
+  out.add("open_edges", f.surface.open_edges, "holes", f.surface.holes, "turned", f.surface.turned);
   out.add("warnings", json_words(f.warnings));
   std::fputs(indented(out.text()).c_str(), stdout);
 }

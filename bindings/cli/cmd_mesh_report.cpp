@@ -4,11 +4,13 @@
 #include <cmath>
 #include <cstdio>
 #include <deform/plugin.h>
+#include <functional>
 
 #include "cell_volume.h"
 #include "cmd_mesh.h"
 #include "crossing.h"
 #include "json_text.h"
+#include "messages.h"
 
 namespace cli {
 namespace {
@@ -38,12 +40,6 @@ struct Report {
   std::string summary;
 };
 
-std::string text(const char *format, double x) {
-  char line[200];
-  std::snprintf(line, sizeof line, format, x);
-  return line;
-}
-
 void take_common(Report &r, const dfm_mesh_info &i) {
   std::copy_n(i.lo, 3, r.lo);
   std::copy_n(i.hi, 3, r.hi);
@@ -72,9 +68,9 @@ std::vector<uint32_t> boundary_of(const uint32_t *tets, uint32_t ntet) {
   for (const uint32_t *t = tets; t != tets + size_t{4} * ntet; t += 4)
     for (const auto &[a, b, c] : {std::array{0, 1, 2}, {0, 1, 3}, {0, 2, 3}, {1, 2, 3}}) {
       faces.push_back({t[a], t[b], t[c]});
-      std::sort(faces.back().begin(), faces.back().end());
+      std::ranges::sort(faces.back());
     }
-  std::sort(faces.begin(), faces.end());
+  std::ranges::sort(faces);
   std::vector<uint32_t> out;
   for (size_t i = 0, end = 0; i < faces.size(); i = end) {
     for (end = i + 1; end < faces.size() && faces[end] == faces[i];) ++end;
@@ -135,24 +131,24 @@ void report_steps(Report &r, const double *x, uint32_t npoint, const uint32_t *t
     if (cell.volume > 0) cells.push_back(cell);
   }
   if (cells.empty()) return;
-  std::stable_sort(cells.begin(), cells.end(),
-                   [](const CellBound &a, const CellBound &b) { return a.sum > b.sum; });
+  std::ranges::stable_sort(cells, std::greater(), &CellBound::sum);
   const double all = mesh_step(cells, 0, tets, npoint);
   const double most = mesh_step(cells, (cells.size() + 99) / 100, tets, npoint);
   r.measures.emplace_back("step", all);
   r.measures.emplace_back("step_without_worst", most);
-  r.lines.emplace_back("explicit sub-step", text("about %.4g m sqrt(density / Young's modulus)", all) +
-                                                text(", without the worst 1 %% of cells %.4g m", most));
+  r.lines.emplace_back(
+      "explicit sub-step",
+      formatted("about %.4g m sqrt(density / Young's modulus), without the worst 1 %% of cells %.4g m", all,
+                most));
   for (size_t n = 0; n < std::min<size_t>(3, cells.size()); ++n) {
     const CellBound &c = cells[n];
     const uint32_t *const t = tets + size_t{4} * c.cell;
     double center[3] = {};
     for (int k = 0; k < 3; ++k)
       for (int i = 0; i < 4; ++i) center[k] += x[size_t{3} * t[i] + size_t(k)] / 4;
-    char line[200];
-    std::snprintf(line, sizeof line, "%u at %.4g %.4g %.4g m: least altitude %.3g m, alone %.3g m", c.cell,
-                  center[0], center[1], center[2], c.altitude, 1 / std::sqrt(c.sum));
-    r.lines.emplace_back("bounded by cell", line);
+    r.lines.emplace_back("bounded by cell",
+                         formatted("%u at %.4g %.4g %.4g m: least altitude %.3g m, alone %.3g m", c.cell,
+                                   center[0], center[1], center[2], c.altitude, 1 / std::sqrt(c.sum)));
   }
 }
 
@@ -201,10 +197,10 @@ void describe_cells(const dfm_mesh_info &i, bool crossings, Report &r) {
   count("surface triangles", i.ntriangle);
   count("edges", i.nedge);
   count("pieces", i.npiece);
-  r.lines.emplace_back("volume", text("%.10g m3", i.volume));
+  r.lines.emplace_back("volume", formatted("%.10g m3", i.volume));
   if (const double material = material_of(i); material >= 0) {
     r.measures.push_back({"material_volume", material});
-    r.lines.emplace_back("of it material", text("%.10g m3", material));
+    r.lines.emplace_back("of it material", formatted("%.10g m3", material));
   }
   r.defects = {{"turned", i.turned},
                {"dropped_points", i.dropped_points},
@@ -224,7 +220,7 @@ void describe_cells(const dfm_mesh_info &i, bool crossings, Report &r) {
   r.summary = std::to_string(i.npoint) + " points, " +
               (kind ? std::to_string(i.ncell) + " " + kind : std::to_string(i.ntet) + " tetrahedra") + ", " +
               std::to_string(i.ntriangle) + " surface triangles, least mean ratio " +
-              text("%.3g", i.quality_min);
+              formatted("%.3g", i.quality_min);
 }
 
 void describe_surface(const dfm_mesh_info &i, bool crossings, Report &r) {
@@ -244,8 +240,8 @@ void describe_surface(const dfm_mesh_info &i, bool crossings, Report &r) {
                          : "no, " + std::to_string(i.open_edges) + " open edges around " +
                                std::to_string(i.holes) + (i.holes == 1 ? " hole, " : " holes, ") +
                                std::to_string(i.nonmanifold_edges) + " edges of more than two triangles");
-  r.lines.emplace_back("area", text("%.10g m2", i.area));
-  if (i.closed) r.lines.emplace_back("volume", text("%.10g m3", i.volume));
+  r.lines.emplace_back("area", formatted("%.10g m2", i.area));
+  if (i.closed) r.lines.emplace_back("volume", formatted("%.10g m3", i.volume));
   r.defects = {{"merged_points", i.duplicate_points},
                {"dropped_points", i.dropped_points},
                {"dropped_triangles", i.dropped_cells},
@@ -259,35 +255,24 @@ void describe_surface(const dfm_mesh_info &i, bool crossings, Report &r) {
   if (crossings) report_crossings(r, i.points, i.npoint, i.faces, i.nface);
   r.summary = std::to_string(i.npoint) + " points, " + std::to_string(i.ntriangle) + " triangles, " +
               (i.closed ? "closed" : std::to_string(i.holes) + " holes") + ", least quality " +
-              text("%.3g", i.quality_min);
+              formatted("%.3g", i.quality_min);
 }
 
 void print_json(const std::string &file, const Report &r, const std::vector<std::string> &notes) {
-  const auto whole = [](uint64_t n) { return std::to_string(n); };
   std::vector<std::string> histogram, groups;
-  for (const uint32_t n : r.histogram) histogram.push_back(whole(n));
+  for (const uint32_t n : r.histogram) histogram.push_back(std::to_string(n));
   for (const Group &g : r.groups)
-    groups.push_back(JsonObject()
-                         .add("name", quoted(g.name))
-                         .add("dimension", whole(g.dimension))
-                         .add(g.by_triangles ? "triangles" : "points", whole(g.count))
-                         .text());
+    groups.push_back(json_object("name", quoted(g.name), "dimension", g.dimension,
+                                 g.by_triangles ? "triangles" : "points", g.count));
   JsonObject out, edge, quality, defects;
-  for (const Defect &d : r.defects) defects.add(d.key, whole(d.count));
-  edge.add("min", number(r.edge_min)).add("median", number(r.edge_median)).add("max", number(r.edge_max));
-  quality.add("min", number(r.quality_min))
-      .add("mean", number(r.quality_mean))
-      .add("histogram", json_array(histogram));
-  out.add("file", quoted(file)).add("kind", quoted(r.kind));
-  for (const auto &[key, n] : r.counts) out.add(key, whole(n));
-  for (const auto &[key, x] : r.measures) out.add(key, number(x));
-  out.add("lo", json_vector(r.lo))
-      .add("hi", json_vector(r.hi))
-      .add("edge", edge.text())
-      .add("quality", quality.text());
-  out.add("defects", defects.text())
-      .add("groups", json_array(groups))
-      .add("warnings", json_words(r.warnings));
+  for (const Defect &d : r.defects) defects.add(d.key, d.count);
+  edge.add("min", r.edge_min, "median", r.edge_median, "max", r.edge_max);
+  quality.add("min", r.quality_min, "mean", r.quality_mean, "histogram", json_array(histogram));
+  out.add("file", quoted(file), "kind", quoted(r.kind));
+  for (const auto &[key, n] : r.counts) out.add(key, n);
+  for (const auto &[key, x] : r.measures) out.add(key, x);
+  out.add("lo", json_vector(r.lo), "hi", json_vector(r.hi), "edge", edge.text(), "quality", quality.text(),
+          "defects", defects.text(), "groups", json_array(groups), "warnings", json_words(r.warnings));
   if (!notes.empty()) out.add("lost", json_words(notes));
   std::fputs(indented(out.text()).c_str(), stdout);
 }
@@ -300,7 +285,7 @@ void print_table(const std::string &file, const Report &r) {
               r.hi[2]);
   std::printf("  edge length       %.4g to %.4g m, median %.4g\n", r.edge_min, r.edge_max, r.edge_median);
   std::printf("  %-17s least %.3g, mean %.3g (1: %s)\n", r.quality, r.quality_min, r.quality_mean, r.best);
-  const uint32_t most = std::max(1u, *std::max_element(r.histogram.begin(), r.histogram.end()));
+  const uint32_t most = std::max(1u, std::ranges::max(r.histogram));
   for (size_t bin = 0; bin < r.histogram.size(); ++bin) {
     const uint32_t n = r.histogram[bin];
     // a few bad ones show, too
@@ -324,7 +309,7 @@ void print_table(const std::string &file, const Report &r) {
 std::string unit_hint(const double lo[3], const double hi[3]) {
   const double longest = std::max({hi[0] - lo[0], hi[1] - lo[1], hi[2] - lo[2]});
   if (longest <= 10) return "";
-  return text(
+  return formatted(
       "it is %.3g m long: if the file is in millimeters, give its body \"pose\": {\"scale\": 0.001} "
       "in a scene, or scale=0.001 in Python",
       longest);

@@ -59,12 +59,8 @@ std::string joined(const std::vector<std::string> &words) {
 
 JsonObject json_head(const Type &t) {
   JsonObject o;
-  o.add("kind", quoted(kind_name(t.type->kind)))
-      .add("id", quoted(t.type->id))
-      .add("name", quoted(t.type->name));
-  o.add("version", quoted(t.type->version))
-      .add("file", quoted(t.file))
-      .add("effects", json_words(effects(*t.type)));
+  o.add("kind", quoted(kind_name(t.type->kind)), "id", quoted(t.type->id), "name", quoted(t.type->name),
+        "version", quoted(t.type->version), "file", quoted(t.file), "effects", json_words(effects(*t.type)));
   return o;
 }
 
@@ -77,9 +73,8 @@ int list(const Globals &globals, const std::vector<std::string> &directories) {
     std::vector<std::string> types, passed;
     for (const Type &t : found.types) types.push_back(json_head(t).text());
     for (const Passed &p : found.passed)
-      passed.push_back(JsonObject().add("file", quoted(p.file)).add("reason", quoted(p.reason)).text());
-    std::fputs(indented(JsonObject().add("types", json_array(types)).add("passed", json_array(passed)).text())
-                   .c_str(),
+      passed.push_back(json_object("file", quoted(p.file), "reason", quoted(p.reason)));
+    std::fputs(indented(json_object("types", json_array(types), "passed", json_array(passed))).c_str(),
                stdout);
     return kDone;
   }
@@ -144,13 +139,11 @@ void print_info(const Type &t) {
     std::printf("\n  %-18s %-10s %-16s %-10s %s\n", "parameter", "default", "range", "unit", "meaning");
   for (uint32_t i = 0; i < type.nparam; ++i) {
     const dfm_param &row = type.params[i];
-    char range[64], value[32];
-    std::snprintf(range, sizeof range, "%g .. %g", row.min, row.max);
-    if (row.flags & DFM_PARAM_AUTO) std::snprintf(value, sizeof value, "auto (%g)", row.def);
-    else std::snprintf(value, sizeof value, "%g", row.def);
-    const std::string names = row.names ? joined(names_of(row)) : "";
-    std::printf("  %-18s %-10s %-16s %-10s %s%s%s%s\n", row.key, value, names.empty() ? range : names.c_str(),
-                row.unit, row.label,
+    const std::string value = formatted(row.flags & DFM_PARAM_AUTO ? "auto (%g)" : "%g", row.def);
+    const std::string names = row.names ? joined(names_of(row)) : "",
+                      range = names.empty() ? formatted("%g .. %g", row.min, row.max) : names;
+    std::printf("  %-18s %-10s %-16s %-10s %s%s%s%s\n", row.key, value.c_str(), range.c_str(), row.unit,
+                row.label,
                 row.width > 1 ? (std::string(row.flags & DFM_PARAM_LIST ? " (up to " : " (") +
                                  std::to_string(row.width) + " values)")
                                     .c_str()
@@ -164,25 +157,18 @@ std::string json_info(const Type &t) {
   std::vector<std::string> rows;
   for (uint32_t i = 0; i < t.type->nparam; ++i) {
     const dfm_param &row = t.type->params[i];
-    const auto flag = [&](uint32_t bit) { return row.flags & bit ? "true" : "false"; };
+    const auto flag = [&](uint32_t bit) { return (row.flags & bit) != 0; };
     JsonObject o;
-    o.add("key", quoted(row.key)).add("label", quoted(row.label)).add("unit", quoted(row.unit));
-    o.add("min", number(row.min))
-        .add("max", number(row.max))
-        .add("default", number(row.def))
-        .add("width", std::to_string(row.width));
-    o.add("integer", flag(DFM_PARAM_INTEGER))
-        .add("runtime", flag(DFM_PARAM_RUNTIME))
-        .add("per_cell", flag(DFM_PARAM_PER_CELL));
-    o.add("auto", flag(DFM_PARAM_AUTO));
+    o.add("key", quoted(row.key), "label", quoted(row.label), "unit", quoted(row.unit), "min", row.min, "max",
+          row.max, "default", row.def, "width", row.width, "integer", flag(DFM_PARAM_INTEGER), "runtime",
+          flag(DFM_PARAM_RUNTIME), "per_cell", flag(DFM_PARAM_PER_CELL), "auto", flag(DFM_PARAM_AUTO));
     if (row.names) o.add("names", json_words(names_of(row)));
     rows.push_back(o.text());
   }
   JsonObject head = json_head(t);
   if (t.type->kind != DFM_KIND_FRICTION) head.add("capabilities", json_words(capabilities(*t.type)));
-  return head.add("licence", quoted(t.type->licence))
-      .add("source", quoted(t.type->source))
-      .add("params", json_array(rows))
+  return head
+      .add("licence", quoted(t.type->licence), "source", quoted(t.type->source), "params", json_array(rows))
       .text();
 }
 

@@ -36,11 +36,7 @@
 namespace cli {
 namespace {
 
-std::string seconds(double t) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%g s", t);
-  return text;
-}
+std::string seconds(double t) { return formatted("%g s", t); }
 
 double cpu_seconds() {
   timespec t = {};
@@ -256,7 +252,7 @@ class Runner {
                     " cells at once were stretched so far that their model limited their stiffness: refine "
                     "the mesh or reduce the load");
     const auto refused = [](const dfm_swap &s) { return (s.flags & DFM_SWAP_REFUSED) != 0; };
-    if (const auto n = std::count_if(result_.swaps.begin(), result_.swaps.end(), refused))
+    if (const auto n = std::ranges::count_if(result_.swaps, refused))
       out.push_back(
           std::string(n == 1 ? "a change of model was" : std::to_string(n) + " changes of models were") +
           " refused, because energy or surface would jump: swaps lists what was refused");
@@ -306,14 +302,13 @@ class Runner {
     const dfm_world_stats stats = world_stats(scene_);
     // the solve of a sub-step that ends the run counts, the sub-step does not
     const uint64_t substeps = std::max(stats.substeps, stats.unconverged);
-    char share[160];
-    std::snprintf(share, sizeof share, "in %llu of %llu sub-steps (%.3g %%), with errors of up to %.1e m/s",
-                  static_cast<unsigned long long>(stats.unconverged),
-                  static_cast<unsigned long long>(substeps),
-                  100 * double(stats.unconverged) / double(substeps), stats.residual_max);
     const std::string said =
-        std::string("the contact solve did not converge ") + share +
-        ": forces of contact and friction are inexact there, and what should hold may creep; ";
+        "the contact solve did not converge in " + std::to_string(stats.unconverged) + " of " +
+        std::to_string(substeps) +
+        formatted(
+            " sub-steps (%.3g %%), with errors of up to %.1e m/s: forces of contact and friction are "
+            "inexact there, and what should hold may creep; ",
+            100 * double(stats.unconverged) / double(substeps), stats.residual_max);
     if (any_cut())
       return said +
              "where teeth of a cut or torn body jam, shorter steps do not help: give its material stiffness "
@@ -329,9 +324,9 @@ class Runner {
     const Checks &seen = checks();
     const std::string what = "cells became inverted (inside out)";
     if (seen.inverted_there == 0) return what + " between two records: reduce the load, or refine the mesh";
-    char where[240];
-    std::snprintf(where, sizeof where, ": up to %u of %u cells of body '%.100s', at %.0f %% of its volume; ",
-                  seen.inverted_there, seen.cells_there, seen.inverted_body.c_str(), 100 * seen.volume_there);
+    const std::string where =
+        formatted(": up to %u of %u cells of body '%.100s', at %.0f %% of its volume; ", seen.inverted_there,
+                  seen.cells_there, seen.inverted_body.c_str(), 100 * seen.volume_there);
     if (seen.inverted_there * 20 < seen.cells_there && seen.volume_there > 0.8)
       return what + where + "refine the mesh or reduce the load";
     if (seen.inverted_model == "org.deform.linear_fem")
@@ -344,8 +339,7 @@ class Runner {
   }
 
   bool any_cut() const {
-    return std::any_of(scene_.bodies().begin(), scene_.bodies().end(),
-                       [](const BodyView &b) { return b.cut; });
+    return std::ranges::any_of(scene_.bodies(), [](const BodyView &b) { return b.cut; });
   }
 
   // What helps against a surface that crosses itself, as far as the scene does not ask for it yet. Self
@@ -555,11 +549,8 @@ class Runner {
 
 void run_scene(RunOptions options, const Globals &globals, Comparison *comparison) {
   if (options.out.empty()) options.out = out_folder(options.scene, "run");
-  if (options.time > 0) {  // the scene is read for that long: it reports what comes after its end
-    char text[64];
-    std::snprintf(text, sizeof text, "/time/duration=%.17g", options.time);
-    options.set.push_back(text);
-  }
+  if (options.time > 0)  // the scene is read for that long: it reports what comes after its end
+    options.set.push_back(formatted("/time/duration=%.17g", options.time));
   const SceneFile scene(globals, options.scene, options.set, options.jitter);
   const std::string planned = planned_json(scene);
   if (const std::string short_of = planned_sentence(planned); !short_of.empty()) warn(short_of);
@@ -589,20 +580,14 @@ void run_scene(RunOptions options, const Globals &globals, Comparison *compariso
     std::printf("written: %s\n", shown(options.out).c_str());
   }
   if (options.profile && !globals.json) print_profile(scene, result);
-  if (result.stopped) {
-    char text[160];
-    std::snprintf(text, sizeof text, "stopped at step %llu, t = %g s",
-                  static_cast<unsigned long long>(result.steps), result.simulated);
-    throw Failure(kStopped, options.scene + ": " + text + ": " + result.stop_reason +
+  const std::string at = " at step " + std::to_string(result.steps) + ", t = " + seconds(result.simulated);
+  if (result.stopped)
+    throw Failure(kStopped, options.scene + ": stopped" + at + ": " + result.stop_reason +
                                 "; the last good state is in " + options.out + "/states/last_*.vtu");
-  }
-  if (result.interrupted) {
-    char text[160];
-    std::snprintf(text, sizeof text, "interrupted at step %llu, t = %g s",
-                  static_cast<unsigned long long>(result.steps), result.simulated);
-    throw Failure(kInterrupted, options.scene + ": " + text + "; what was recorded until then is in " +
-                                    options.out + ", its last state in states/last_*.vtu");
-  }
+  if (result.interrupted)
+    throw Failure(kInterrupted, options.scene + ": interrupted" + at +
+                                    "; what was recorded until then is in " + options.out +
+                                    ", its last state in states/last_*.vtu");
   if (unsaved) throw *unsaved;
 }
 
@@ -657,8 +642,7 @@ void add_run(Command app, Globals &globals, int *exit_code, CaptureProblems *cap
         throw Failure(kBadInput, "--save: expected a finite time of 0 s or more, found " + number(at));
       options->saves.push_back({at, path});
     }
-    std::stable_sort(options->saves.begin(), options->saves.end(),
-                     [](const auto &a, const auto &b) { return a.at < b.at; });
+    std::ranges::stable_sort(options->saves, [](const auto &a, const auto &b) { return a.at < b.at; });
     run_scene(*options, globals);
     *exit_code = kDone;
   });

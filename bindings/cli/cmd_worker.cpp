@@ -110,8 +110,8 @@ void handle_requests(const RunOptions &options, const Globals &globals, const St
     if (errno != EINTR) fail_worker("waitpid");
   const bool ended = WIFEXITED(status);
   JsonObject reply;
-  reply.add("code", std::to_string(ended ? WEXITSTATUS(status) : -1));
-  reply.add("signal", std::to_string(ended ? 0 : WTERMSIG(status))).add("said", quoted(last_line(errors)));
+  reply.add("code", ended ? WEXITSTATUS(status) : -1, "signal", ended ? 0 : WTERMSIG(status), "said",
+            quoted(last_line(errors)));
   close(errors);
   std::fprintf(streams.replies, "%s\n", reply.text().c_str());
   std::fflush(streams.replies);

@@ -60,7 +60,7 @@ void Drawing::set_color(const std::string &color) {
       range.items.size() == 2)
     fixed_ = {std::strtof(range.items[0].text.c_str(), nullptr),
               std::strtof(range.items[1].text.c_str(), nullptr)};
-  for (Buffers &b : buffers_) std::fill(b.scalar.begin(), b.scalar.end(), 0.f);
+  for (Buffers &b : buffers_) std::ranges::fill(b.scalar, 0.f);
   if (color != "stress") return;
   for (size_t i = 0; i < buffers_.size(); ++i) {
     Buffers &b = buffers_[i];

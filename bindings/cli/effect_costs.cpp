@@ -56,15 +56,14 @@ std::string costs_json(const std::vector<EffectCost> &costs) {
   std::vector<std::string> rows;
   for (const EffectCost &c : costs) {
     JsonObject row;
-    row.add("body", c.body.empty() ? "null" : quoted(c.body)).add("effect", quoted(c.effect));
+    row.add("body", c.body.empty() ? "null" : quoted(c.body), "effect", quoted(c.effect));
     if (!c.why_not.empty()) {
       rows.push_back(row.add("why_not", quoted(c.why_not)).text());
       continue;
     }
-    row.add("us_per_step", number(1e6 * c.median)).add("low", number(1e6 * c.low));
-    row.add("high", number(1e6 * c.high)).add("share", number(c.with > 0 ? c.median / c.with : 0));
-    row.add("steps", std::to_string(c.steps)).add("pairs", std::to_string(c.pairs));
-    rows.push_back(row.add("above_noise", c.clear() ? "true" : "false").text());
+    row.add("us_per_step", 1e6 * c.median, "low", 1e6 * c.low, "high", 1e6 * c.high, "share",
+            c.with > 0 ? c.median / c.with : 0, "steps", c.steps, "pairs", c.pairs);
+    rows.push_back(row.add("above_noise", c.clear()).text());
   }
   return json_array(rows);
 }

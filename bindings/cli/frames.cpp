@@ -79,15 +79,12 @@ class OffScreen : public Frames {
     if (!renderer_->draw(picture_scene, image, &why))
       throw Failure(kBadInput, "frame " + std::to_string(number) + ": " + why);
     annotate(image, t);
-    char name[40];
-    std::snprintf(name, sizeof name, "/frame_%06u.png", number);
-    if (!render::write_png(folder_ + name, image, &why)) throw Failure(kBadInput, why);
+    if (!render::write_png(folder_ + formatted("/frame_%06u.png", number), image, &why))
+      throw Failure(kBadInput, why);
   }
 
   void annotate(render::Image &image, double t) const {
-    char text[40];
-    std::snprintf(text, sizeof text, "t = %.3f s", t);
-    render::draw_text(image, 16, 28, 14, text, {0.15f, 0.17f, 0.2f});
+    render::draw_text(image, 16, 28, 14, formatted("t = %.3f s", t), {0.15f, 0.17f, 0.2f});
     Drawing::Legend l;
     if (drawing_.legend(l)) render::legend(image, l.map, l.range.low, l.range.high, l.title, l.unit);
   }

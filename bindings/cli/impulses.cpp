@@ -57,10 +57,9 @@ void Impulses::add_step(double step) {
 std::string Impulses::json() const {
   JsonObject out;
   for (const auto &[pair, sum] : sums_) {
-    JsonObject row;
-    row.add("normal_Ns", number(sum.normal)).add("peak_N", number(sum.largest.value() / window_));
-    row.add("peak_window_s", number(window_));
-    out.add(scene_.name_of(pair.first) + "/" + scene_.name_of(pair.second), row.text());
+    out.add(scene_.name_of(pair.first) + "/" + scene_.name_of(pair.second),
+            json_object("normal_Ns", sum.normal, "peak_N", sum.largest.value() / window_, "peak_window_s",
+                        window_));
   }
   return out.text();
 }

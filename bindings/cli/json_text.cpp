@@ -55,9 +55,8 @@ std::string number(double x) {
   return std::string(text, end.ptr);
 }
 
-JsonObject &JsonObject::add(const std::string &key, const std::string &value) {
-  members_.emplace_back(key, value);
-  return *this;
+void JsonObject::append(std::initializer_list<std::string> members) {
+  for (const std::string *m = members.begin(); m != members.end(); m += 2) members_.emplace_back(m[0], m[1]);
 }
 
 std::string JsonObject::text() const {

@@ -1,5 +1,7 @@
 // JSON that the command writes, and the little it must read back: the library's own explain text.
 #pragma once
+#include <concepts>
+#include <initializer_list>
 #include <span>
 #include <string>
 #include <utility>
@@ -12,15 +14,35 @@ std::string quoted(const std::string &text);
 std::string as_utf8(std::string text);
 std::string number(double x);  // shortest text that reads back the same; "null" for what JSON cannot hold
 
-// Builds "{...}" or "[...]"; values are JSON text already.
+// A number or a truth as JSON; a text is JSON already.
+template <class T>
+std::string json_of(const T &value) {
+  if constexpr (std::same_as<T, bool>) return value ? "true" : "false";
+  else if constexpr (std::integral<T>) return std::to_string(value);
+  else if constexpr (std::floating_point<T>) return number(value);
+  else return value;
+}
+
+// Builds "{...}" or "[...]".
 class JsonObject {
  public:
-  JsonObject &add(const std::string &key, const std::string &value);
+  // A key and its value, the next key and its value, ...
+  template <class... Texts>
+  JsonObject &add(const Texts &...members) {
+    static_assert(sizeof...(members) % 2 == 0, "a key has no value");
+    append({json_of(members)...});
+    return *this;
+  }
   std::string text() const;
 
  private:
+  void append(std::initializer_list<std::string> members);
   std::vector<std::pair<std::string, std::string>> members_;
 };
+template <class... Texts>
+std::string json_object(const Texts &...members) {
+  return JsonObject().add(members...).text();
+}
 std::string json_array(const std::vector<std::string> &values);
 std::string json_words(const std::vector<std::string> &words);  // quoted
 std::string json_numbers(std::span<const double> values);

@@ -39,6 +39,13 @@ std::vector<T> listed(List list, Of... of) {
   return out;
 }
 
+// As printf writes it.
+#ifdef __MINGW_PRINTF_FORMAT
+[[gnu::format(__MINGW_PRINTF_FORMAT, 1, 2)]]
+#else
+[[gnu::format(printf, 1, 2)]]
+#endif
+std::string formatted(const char *format, ...);
 void warn(const std::string &sentence);          // to stderr, and kept for the summary
 void keep_warning(const std::string &sentence);  // for the summary only
 const std::vector<std::string> &warnings();

@@ -82,9 +82,7 @@ void Outputs::record() {
   if (contacts_) write_contacts(t);
   write_probes(t);
   if (index_) {
-    char number_text[16];
-    std::snprintf(number_text, sizeof number_text, "_%06u", recorded_);
-    write_states(number_text);
+    write_states(formatted("_%06u", recorded_));
     index_->cell(std::to_string(recorded_)).cell(t).end_row();
     index_->flush();
   }
@@ -221,8 +219,7 @@ void Outputs::write_nodes() {
     const std::vector<double> u = node_displacements(nodes);
     std::vector<uint32_t> order(nodes.number.size());
     for (uint32_t i = 0; i < order.size(); ++i) order[i] = i;
-    std::sort(order.begin(), order.end(),
-              [&](uint32_t i, uint32_t j) { return nodes.number[i] < nodes.number[j]; });
+    std::ranges::sort(order, [&](uint32_t i, uint32_t j) { return nodes.number[i] < nodes.number[j]; });
     std::string text = "node,ux,uy,uz\n";
     for (const uint32_t i : order) {
       if (std::isnan(u[3 * size_t(i)])) continue;

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <functional>
 #include <map>
 #include <string_view>
 #include <utility>
@@ -32,23 +33,20 @@ void StepTimes::add(double seconds) {
 double StepTimes::quantile(double q) const {
   if (kept_.empty()) return NAN;
   std::vector<float> sorted = kept_;
-  std::sort(sorted.begin(), sorted.end());
+  std::ranges::sort(sorted);
   return sorted[std::min(sorted.size() - 1, size_t(q * double(sorted.size())))];
 }
 
 dfm_world_stats world_stats(const SceneFile &scene) {
-  const dfm_world_stats stats = got<dfm_world_stats>(dfm_world_get_stats, scene.world());
-  return stats;
+  return got<dfm_world_stats>(dfm_world_get_stats, scene.world());
 }
 
 dfm_body_measure body_measure(const BodyView &body) {
-  const dfm_body_measure m = got<dfm_body_measure>(dfm_body_get_measure, body.handle);
-  return m;
+  return got<dfm_body_measure>(dfm_body_get_measure, body.handle);
 }
 
 dfm_body_measure rigid_measure(const RigidView &rigid) {
-  const dfm_body_measure m = got<dfm_body_measure>(dfm_rigid_get_measure, rigid.handle);
-  return m;
+  return got<dfm_body_measure>(dfm_rigid_get_measure, rigid.handle);
 }
 
 void add_unwatched(const SceneFile &scene, RunResult &run) {
@@ -82,7 +80,7 @@ std::vector<std::array<uint32_t, 2>> Checker::joined() const {
         if (scene_.bodies()[other].handle == a.to) out.push_back({std::min(b, other), std::max(b, other)});
     }
   }
-  std::sort(out.begin(), out.end());
+  std::ranges::sort(out);
   return out;
 }
 
@@ -102,7 +100,7 @@ void Checker::check(bool start_state) {
     state_.resize(6 * size_t(body.npoint));
     need(dfm_body_get_state(body.handle, body.npoint, state_.data(), state_.data() + 3 * size_t(body.npoint),
                             &n));
-    finite = finite && std::all_of(state_.begin(), state_.end(), [](double x) { return std::isfinite(x); });
+    finite = finite && std::ranges::all_of(state_, [](double x) { return std::isfinite(x); });
     positions_[b].resize(3 * size_t(body.nsurfel));
     need(dfm_surface_positions(body.handle, body.nsurfel, positions_[b].data(), &n));
     for (double x : positions_[b]) reach = std::max(reach, std::fabs(x));
@@ -179,14 +177,14 @@ std::vector<dfm_stage_time> profile(const SceneFile &scene) {
 std::string stages_json(const SceneFile &scene, uint64_t steps) {
   JsonObject out;
   for (const dfm_stage_time &stage : profile(scene))
-    out.add(stage.name, number(1e3 * stage.seconds / double(std::max<uint64_t>(1, steps))));
+    out.add(stage.name, 1e3 * stage.seconds / double(std::max<uint64_t>(1, steps)));
   return out.text();
 }
 
 std::string names_json(const JsonValue &plan, const char *key) {
   std::vector<std::string> names;
-  for (const JsonValue &row : plan.list(key)) names.push_back(quoted(row.get("name")));
-  return json_array(names);
+  for (const JsonValue &row : plan.list(key)) names.push_back(row.get("name"));
+  return json_words(names);
 }
 
 std::string plugins_json(const SceneFile &scene) {
@@ -194,11 +192,9 @@ std::string plugins_json(const SceneFile &scene) {
   need(dfm_plugin_visit(
       scene.context(),
       [](void *user, const dfm_type *type, const char *file) {
-        JsonObject row;
-        row.add("id", quoted(type->id))
-            .add("version", quoted(type->version ? type->version : ""))
-            .add("file", quoted(file ? file : ""));
-        static_cast<std::vector<std::string> *>(user)->push_back(row.text());
+        static_cast<std::vector<std::string> *>(user)->push_back(
+            json_object("id", quoted(type->id), "version", quoted(type->version ? type->version : ""), "file",
+                        quoted(file ? file : "")));
       },
       &rows));
   return json_array(rows);
@@ -217,10 +213,9 @@ std::string facts_json(const JsonValue &plan, const std::string &body) {
 
 std::string body_json(const dfm_body_measure &m, uint64_t dofs, uint32_t cells, const std::string &facts) {
   JsonObject row;
-  row.add("com", json_vector(m.com)).add("velocity", json_vector(m.velocity));
-  row.add("kinetic_J", number(m.kinetic)).add("elastic_J", number(m.elastic));
-  row.add("volume_ratio", number(m.volume / m.rest_volume)).add("speed_max", number(m.speed_max));
-  row.add("dofs", std::to_string(dofs)).add("cells", std::to_string(cells));
+  row.add("com", json_vector(m.com), "velocity", json_vector(m.velocity), "kinetic_J", m.kinetic, "elastic_J",
+          m.elastic, "volume_ratio", m.volume / m.rest_volume, "speed_max", m.speed_max, "dofs", dofs,
+          "cells", cells);
   if (!facts.empty()) row.add("facts", facts);
   return row.text();
 }
@@ -239,16 +234,10 @@ std::string swaps_json(const SceneFile &scene, const RunResult &run) {
   std::vector<std::string> rows;
   for (const dfm_swap &s : run.swaps) {
     const bool refused = s.flags & DFM_SWAP_REFUSED;
-    JsonObject row;
-    row.add("t", number(s.t))
-        .add("body", quoted(scene.name_of(s.body)))
-        .add("from", quoted(s.from))
-        .add("to", quoted(s.to))
-        .add("refused", refused ? "true" : "false");
-    row.add("elastic_before_J", number(s.elastic_before))
-        .add("elastic_after_J", number(s.elastic_after))
-        .add("jump_J", number(s.elastic_after - s.elastic_before));
-    rows.push_back(row.text());
+    rows.push_back(json_object("t", s.t, "body", quoted(scene.name_of(s.body)), "from", quoted(s.from), "to",
+                               quoted(s.to), "refused", refused, "elastic_before_J", s.elastic_before,
+                               "elastic_after_J", s.elastic_after, "jump_J",
+                               s.elastic_after - s.elastic_before));
   }
   return json_array(rows);
 }
@@ -260,9 +249,8 @@ std::string energy_json(const SceneFile &scene, const RunResult &run, const dfm_
   JsonObject unwatched, out;
   for (const auto &[name, why] : run.unwatched) unwatched.add(name, quoted(why));
   const auto joules = [&](double value) { return known ? number(value) : std::string("null"); };
-  out.add("start_J", joules(stats.energy_start))
-      .add("max_J", joules(stats.energy_max))
-      .add("gain_J", joules(stats.energy_gain));
+  out.add("start_J", joules(stats.energy_start), "max_J", joules(stats.energy_max), "gain_J",
+          joules(stats.energy_gain));
   return out.add("unwatched", unwatched.text()).text();
 }
 
@@ -278,9 +266,8 @@ std::vector<std::pair<std::string, double>> stream_rates(const SceneFile &scene,
 
 std::string stream_json(const SceneFile &scene, const RtpSender::Report &sent) {
   JsonObject rates, out;
-  for (const auto &[body, rate] : stream_rates(scene, sent)) rates.add(body, number(rate));
-  out.add("frames", std::to_string(sent.frames)).add("packets", std::to_string(sent.packets));
-  out.add("bytes", std::to_string(sent.bytes)).add("lost", number(sent.lost));
+  for (const auto &[body, rate] : stream_rates(scene, sent)) rates.add(body, rate);
+  out.add("frames", sent.frames, "packets", sent.packets, "bytes", sent.bytes, "lost", sent.lost);
   return out.add("kbit_per_s", rates.text()).text();
 }
 
@@ -300,18 +287,16 @@ std::string auto_json(const JsonValue &plan) {
   const AutoShare share = auto_share(plan);
   if (!(share.steps > 0)) return "null";
   JsonObject row;
-  row.add("steps_s", number(share.steps))
-      .add("implicit_s", number(share.implicit))
-      .add("implicit_share", number(share.implicit / share.steps));
-  return row.add("changes", number(share.changes)).text();
+  row.add("steps_s", share.steps, "implicit_s", share.implicit, "implicit_share",
+          share.implicit / share.steps);
+  return row.add("changes", share.changes).text();
 }
 
 std::string stopped_json(const RunResult &run) {
   if (!run.stopped && !run.interrupted) return "null";
   JsonObject row;
-  row.add("step", std::to_string(run.steps))
-      .add("t", number(run.simulated))
-      .add("body", run.stop_body.empty() ? "null" : quoted(run.stop_body));
+  row.add("step", run.steps, "t", run.simulated, "body",
+          run.stop_body.empty() ? "null" : quoted(run.stop_body));
   return row.add("reason", quoted(run.stop_reason)).text();
 }
 
@@ -324,66 +309,44 @@ std::string summary_json(const SceneFile &scene, const RunOptions &options, cons
   const dfm_world_stats stats = world_stats(scene);
   JsonValue plan;
   parse_json(scene.explain(), plan);
-  JsonObject ms, solver, hold, effects, contacts, guard, budget, out;
-  ms.add("median", number(1e3 * run.times.quantile(0.5))).add("p99", number(1e3 * run.times.quantile(0.99)));
-  ms.add("max", number(1e3 * run.times.longest()));
-  solver.add("passes", std::to_string(stats.passes_max)).add("sweeps", std::to_string(stats.sweeps_max));
-  solver.add("residual_max", number(stats.residual_max));
-  hold.add("creep_max_um_per_s", run.hold_begun && run.hold_count > 0 ? number(1e6 * run.creep) : "null");
-  effects.add("active", names_json(plan, "effects")).add("absent", names_json(plan, "absent"));
-  guard.add("solves", std::to_string(stats.guard_solves))
-      .add("cuts", std::to_string(stats.guard_cuts))
-      .add("lost_s", number(stats.guard_lost));
-  budget.add("work_max", std::to_string(stats.work_max))
-      .add("cheapened", std::to_string(stats.cheapened))
-      .add("shortened", std::to_string(stats.shortened));
-  contacts.add("max", std::to_string(stats.contacts_max)).add("mean", number(run.contacts_mean));
-  out.add("format", "\"deform-summary\"")
-      .add("version", "1")
-      .add("library", quoted(dfm_version(nullptr, nullptr, nullptr)));
-  out.add("scene", quoted(options.scene))
-      .add("steps", std::to_string(run.steps))
-      .add("substeps", std::to_string(stats.substeps));
-  out.add("simulated_s", number(run.simulated - run.begun))
-      .add("wall_s", number(run.wall))
-      .add("cpu_s", number(run.cpu));
-  out.add("ms_per_step", ms.text())
-      .add("stages", stages_json(scene, run.steps))
-      .add("threads", std::to_string(stats.threads));
-  out.add("finite", checks.finite ? "true" : "false").add("states_checked", std::to_string(checks.states));
-  out.add("intersections_max", std::to_string(checks.intersections_max));
-  out.add("intersections_between_max", std::to_string(checks.between_max))
-      .add("intersections_self_max", std::to_string(checks.self_max));
-  out.add("overlaps_at_start", std::to_string(run.overlaps)).add("untangled", std::to_string(run.untangled));
-  out.add("inverted_max", std::to_string(std::max(checks.inverted_max, stats.inverted_max)))
-      .add("limited_max", std::to_string(stats.limited_max));
-  out.add("self_bodies_max", std::to_string(stats.self_max));
-  out.add("guard_steps", std::to_string(stats.guard_steps))
-      .add("guard", guard.text())
-      .add("unconverged_steps", std::to_string(stats.unconverged));
-  out.add("budget", budget.text());
-  out.add("auto", auto_json(plan));
-  out.add("energy", energy_json(scene, run, stats));
-  out.add("solver", solver.text())
-      .add("hold", hold.text())
-      .add("effects", effects.text())
-      .add("plugins", plugins_json(scene));
-  if (run.load_steps > 0) {
-    JsonObject equilibrium;
-    equilibrium.add("load_steps", std::to_string(run.load_steps))
-        .add("iterations", std::to_string(run.iterations))
-        .add("residual", number(run.residual));
-    out.add("equilibrium", equilibrium.text());
-  }
-  out.add("bodies", bodies_json(scene, plan))
-      .add("contacts", contacts.text())
-      .add("impulse", run.impulses)
-      .add("swaps", swaps_json(scene, run))
-      .add("state_hash", quoted(hash_text(dfm_world_hash(scene.world()))));
+  JsonObject out;
+  out.add("format", "\"deform-summary\"", "version", "1");
+  out.add("library", quoted(dfm_version(nullptr, nullptr, nullptr)), "scene", quoted(options.scene));
+  out.add("steps", run.steps, "substeps", stats.substeps, "simulated_s", run.simulated - run.begun);
+  out.add("wall_s", run.wall, "cpu_s", run.cpu);
+  out.add("ms_per_step", json_object("median", 1e3 * run.times.quantile(0.5), "p99",
+                                     1e3 * run.times.quantile(0.99), "max", 1e3 * run.times.longest()));
+  out.add("stages", stages_json(scene, run.steps), "threads", stats.threads);
+  out.add("finite", checks.finite, "states_checked", checks.states);
+  out.add("intersections_max", checks.intersections_max, "intersections_between_max", checks.between_max);
+  out.add("intersections_self_max", checks.self_max);
+  out.add("overlaps_at_start", run.overlaps, "untangled", run.untangled);
+  out.add("inverted_max", std::max(checks.inverted_max, stats.inverted_max));
+  out.add("limited_max", stats.limited_max, "self_bodies_max", stats.self_max);
+  out.add("guard_steps", stats.guard_steps, "guard",
+          json_object("solves", stats.guard_solves, "cuts", stats.guard_cuts, "lost_s", stats.guard_lost));
+  out.add(
+      "unconverged_steps", stats.unconverged, "budget",
+      json_object("work_max", stats.work_max, "cheapened", stats.cheapened, "shortened", stats.shortened));
+  out.add("auto", auto_json(plan), "energy", energy_json(scene, run, stats));
+  out.add("solver", json_object("passes", stats.passes_max, "sweeps", stats.sweeps_max, "residual_max",
+                                stats.residual_max));
+  const bool held = run.hold_begun && run.hold_count > 0;
+  out.add("hold", json_object("creep_max_um_per_s", held ? number(1e6 * run.creep) : "null"));
+  out.add("effects",
+          json_object("active", names_json(plan, "effects"), "absent", names_json(plan, "absent")));
+  out.add("plugins", plugins_json(scene));
+  if (run.load_steps > 0)
+    out.add("equilibrium", json_object("load_steps", run.load_steps, "iterations", run.iterations, "residual",
+                                       run.residual));
+  out.add("bodies", bodies_json(scene, plan));
+  out.add("contacts", json_object("max", stats.contacts_max, "mean", run.contacts_mean));
+  out.add("impulse", run.impulses, "swaps", swaps_json(scene, run));
+  out.add("state_hash", quoted(hash_text(dfm_world_hash(scene.world()))));
   if (!run.sensors.empty()) out.add("sensors", run.sensors);
   if (run.stream.frames) out.add("stream", stream_json(scene, run.stream));
   if (const std::string planned = planned_json(scene); !planned.empty()) out.add("planner", planned);
-  out.add("stopped", stopped_json(run)).add("warnings", json_words(warnings()));
+  out.add("stopped", stopped_json(run), "warnings", json_words(warnings()));
   return as_utf8(indented(out.text()));
 }
 
@@ -391,9 +354,7 @@ namespace {
 
 std::string joules(double energy) {
   if (std::isnan(energy)) return "unknown (the model computes none)";
-  char text[40];
-  std::snprintf(text, sizeof text, "%.4g J", energy);
-  return text;
+  return formatted("%.4g J", energy);
 }
 
 // Most pieces of a shattered body are of a few cells, and each is a body: they are counted, not listed.
@@ -451,8 +412,7 @@ void print_stream(const SceneFile &scene, const RtpSender::Report &sent) {
               static_cast<unsigned long long>(sent.frames), static_cast<unsigned long long>(sent.packets),
               1e-6 * double(sent.bytes), 1e3 * sent.seconds / double(sent.frames), 100 * sent.lost);
   auto rates = stream_rates(scene, sent);
-  std::stable_sort(rates.begin(), rates.end(),
-                   [](const auto &a, const auto &b) { return a.second > b.second; });
+  std::ranges::stable_sort(rates, std::greater(), &std::pair<std::string, double>::second);
   for (size_t i = 0; i < rates.size() && i < kMax; ++i)
     std::printf("streamed of %s: %.4g kbit/s\n", rates[i].first.c_str(), rates[i].second);
 }
@@ -482,10 +442,9 @@ void print_table(const SceneFile &scene, const RunResult &run, const Checks &che
               "fastest m/s", "volume");
   for (const BodyView &body : scene.bodies()) {
     const dfm_body_measure m = body_measure(body);
-    char com[64];
-    std::snprintf(com, sizeof com, "%9.4f %9.4f %9.4f", m.com[0], m.com[1], m.com[2]);
-    std::printf("%-16.16s %9u %8u  %-30s %11.3g %8.2f%%\n", body.name.c_str(), body.npoint, body.ntet, com,
-                m.speed_max, 100 * m.volume / m.rest_volume);
+    const std::string com = formatted("%9.4f %9.4f %9.4f", m.com[0], m.com[1], m.com[2]);
+    std::printf("%-16.16s %9u %8u  %-30s %11.3g %8.2f%%\n", body.name.c_str(), body.npoint, body.ntet,
+                com.c_str(), m.speed_max, 100 * m.volume / m.rest_volume);
   }
   std::printf("%llu steps, %g s simulated in %.3g s: %.4g steps/s, %.3g x real time\n",
               static_cast<unsigned long long>(run.steps), run.simulated - run.begun, run.wall,

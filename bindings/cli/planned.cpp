@@ -5,15 +5,14 @@
 #include <cstdlib>
 
 #include "json_text.h"
+#include "messages.h"
 
 namespace cli {
 namespace {
 
 std::string percent(const JsonValue &row, const char *key) {
-  char text[32];
   const double share = 100 * row.scalar(key);
-  std::snprintf(text, sizeof text, share < 99.5 ? "%.2g %%" : "%.0f %%", share);
-  return text;
+  return formatted(share < 99.5 ? "%.2g %%" : "%.0f %%", share);
 }
 
 void print_way(const JsonValue &way, const char *begin) {
@@ -22,12 +21,11 @@ void print_way(const JsonValue &way, const char *begin) {
   for (size_t i = 0; i < bodies.size() && i < 4; ++i) models += (i ? ", " : "") + bodies[i].get("model");
   if (bodies.size() > 4) models += ", ...";
   const std::string scheme = bodies.empty() ? "" : bodies[0].get("integrator");
-  char step[32] = "auto", each[32] = "1/60 s";
   const double h = way.scalar("step");
-  if (h > 0) std::snprintf(step, sizeof step, "%.3g ms", 1e3 * h);
-  if (std::fabs(h - way.scalar("frame_s")) < 1e-6 * h) std::snprintf(each, sizeof each, "step");
+  const std::string step = h > 0 ? formatted("%.3g ms", 1e3 * h) : "auto";
+  const char *const each = std::fabs(h - way.scalar("frame_s")) < 1e-6 * h ? "step" : "1/60 s";
   std::printf("%s%-38s  %-16s  step %-9s  error %-8s  %.3g s of processor per second, %.3g ms per %s\n",
-              begin, models.c_str(), scheme.c_str(), step, percent(way, "error").c_str(),
+              begin, models.c_str(), scheme.c_str(), step.c_str(), percent(way, "error").c_str(),
               way.scalar("cpu_s_per_s"), way.scalar("ms_per_step"), each);
 }
 

@@ -19,13 +19,9 @@ constexpr const char *kFormat = "deform-recording", *kVersion = "1", *kByHand = 
 constexpr uint64_t kMaxIndex = uint64_t{1} << 28;  // bytes
 
 std::string run_file(const SceneFile &scene, const RunOptions &options, bool by_hand) {
-  JsonObject out;
-  out.add("format", quoted(kFormat))
-      .add("version", by_hand ? kByHand : kVersion)
-      .add("scene", quoted(name_of(fs::absolute(path_of(scene.path())))))
-      .add("set", json_words(options.set))
-      .add("jitter", std::to_string(options.jitter));
-  return indented(out.text());
+  return indented(json_object("format", quoted(kFormat), "version", by_hand ? kByHand : kVersion, "scene",
+                              quoted(name_of(fs::absolute(path_of(scene.path())))), "set",
+                              json_words(options.set), "jitter", options.jitter));
 }
 
 std::string made(const std::string &folder) {
@@ -51,8 +47,7 @@ void Recorder::act(const std::string &line) {
 }
 
 void Recorder::add() {
-  char name[32];
-  std::snprintf(name, sizeof name, "%06u.state", count_++);
+  const std::string name = formatted("%06u.state", count_++);
   write_state(scene_, folder_ + "/" + name);
   index_.cell(dfm_world_time(scene_.world())).cell(name).cell(hash_text(dfm_world_hash(scene_.world())));
   index_.end_row();

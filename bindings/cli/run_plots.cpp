@@ -46,11 +46,8 @@ struct Axis {
   double at(double x) const { return from + (x - low) / (high - low) * (to - from); }
   template <class F>
   void each_tick(F &&tick) const {
-    for (double n = std::ceil(low / step - 1e-9); n * step <= high + 1e-9 * step; ++n) {
-      char text[32];
-      std::snprintf(text, sizeof text, "%.4g", n * step + 0.0);
-      tick(at(n * step), text);
-    }
+    for (double n = std::ceil(low / step - 1e-9); n * step <= high + 1e-9 * step; ++n)
+      tick(at(n * step), formatted("%.4g", n * step + 0.0));
   }
 };
 
@@ -66,11 +63,11 @@ void draw_panel(Canvas &canvas, const std::vector<double> &t, const Plot &plot, 
   if (low > high) low = high = 0;
   const double left = x0 + 66, right = x0 + kWide - 20, top = y0 + 38, bottom = y0 + kHigh - 38;
   const Axis across(t.front(), t.back(), left, right, 6), up(low, high, bottom, top, 5);
-  across.each_tick([&](double x, const char *text) {
+  across.each_tick([&](double x, const std::string &text) {
     canvas.line(x, top, x, bottom, 1, kFaint, false);
     canvas.text(x, bottom + 16, 7.5, text, kText, 0.5);
   });
-  up.each_tick([&](double y, const char *text) {
+  up.each_tick([&](double y, const std::string &text) {
     canvas.line(left, y, right, y, 1, kFaint, false);
     canvas.text(left - 6, y + 4, 7.5, text, kText, 1);
   });

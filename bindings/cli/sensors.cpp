@@ -37,11 +37,8 @@ std::string Sensors::json() const {
     std::vector<std::string> inside;
     for (const uint64_t thing : listed<uint64_t>(dfm_sensor_things, s.sensor))
       inside.push_back(quoted(scene_.name_of(thing)));
-    JsonObject row;
-    row.add("begins", std::to_string(s.begins))
-        .add("ends", std::to_string(s.ends))
-        .add("inside", json_array(inside));
-    out.add(scene_.name_of(s.sensor), row.text());
+    out.add(scene_.name_of(s.sensor),
+            json_object("begins", s.begins, "ends", s.ends, "inside", json_array(inside)));
   }
   return out.text();
 }

@@ -1,5 +1,6 @@
 // What every subcommand and the viewer use: global options, the context, warnings and errors.
 #include <algorithm>
+#include <cstdarg>
 #include <cstdio>
 #include <cstdlib>
 #include <utility>
@@ -67,6 +68,17 @@ std::string nearest(const std::string &word, const std::vector<std::string> &val
 std::string did_you_mean(const std::string &word, const std::vector<std::string> &valid) {
   const std::string near = nearest(word, valid);
   return near.empty() ? "" : "; did you mean \"" + near + "\"?";
+}
+
+std::string formatted(const char *format, ...) {
+  va_list values, again;
+  va_start(values, format);
+  va_copy(again, values);
+  std::string out(size_t(std::vsnprintf(nullptr, 0, format, values)), '\0');
+  std::vsnprintf(out.data(), out.size() + 1, format, again);
+  va_end(again);
+  va_end(values);
+  return out;
 }
 
 int fail(const std::string &sentence) {

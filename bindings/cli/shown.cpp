@@ -24,7 +24,7 @@ std::string shown(const std::string &text) {
 }
 
 std::string shown_word(const std::string &text) {
-  const bool plain = !text.empty() && std::all_of(text.begin(), text.end(), [](unsigned char c) {
+  const bool plain = !text.empty() && std::ranges::all_of(text, [](unsigned char c) {
     return std::isalnum(c) || c >= 0x80 || std::strchr("_-+./:,@%=", c);
   });
   if (plain) return shown(text);

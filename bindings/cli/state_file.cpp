@@ -55,9 +55,7 @@ std::vector<std::string> needs_of(const SceneFile &scene) {
   std::vector<std::string> out;
   for (const auto &[id, version] : versions(scene)) {
     if (!names.count(id) && !names.count(id.substr(id.find_last_of('.') + 1))) continue;
-    JsonObject row;
-    row.add("id", quoted(id)).add("version", quoted(version));
-    out.push_back(row.text());
+    out.push_back(json_object("id", quoted(id), "version", quoted(version)));
   }
   return out;
 }
@@ -74,17 +72,13 @@ std::string devices_of(const SceneFile &scene) {
 }
 
 std::string head_of(const SceneFile &scene, size_t bytes) {
-  JsonObject head;
-  head.add("format", quoted(kFormat))
-      .add("version", kVersion)
-      .add("library", quoted(dfm_version(nullptr, nullptr, nullptr)))
-      .add("scene", quoted(hash_text(scene_hash(scene))))
-      .add("devices", quoted(devices_of(scene)))
-      .add("t", number(dfm_world_time(scene.world())))
-      .add("state_hash", quoted(hash_text(dfm_world_hash(scene.world()))))
-      .add("plugins", json_array(needs_of(scene)))
-      .add("bytes", std::to_string(bytes));
-  return head.text() + "\n";
+  return json_object("format", quoted(kFormat), "version", kVersion, "library",
+                     quoted(dfm_version(nullptr, nullptr, nullptr)), "scene",
+                     quoted(hash_text(scene_hash(scene))), "devices", quoted(devices_of(scene)), "t",
+                     dfm_world_time(scene.world()), "state_hash",
+                     quoted(hash_text(dfm_world_hash(scene.world()))), "plugins", json_array(needs_of(scene)),
+                     "bytes", bytes) +
+         "\n";
 }
 
 [[noreturn]] void refuse(const std::string &path, const std::string &why) {

@@ -53,15 +53,14 @@ void check_first_step(const SceneFile &scene) {
   const double start = dfm_world_time(scene.world()), step = next_step(scene, start, start);
   const uint32_t most = dfm_world_def_default().max_substeps;  // scenes have no key for it
   if (!(stable > 0) || !(std::ceil(step / stable - 1e-9) > most)) return;
-  char text[160];
-  std::snprintf(text, sizeof text,
-                "/time/step: a step of %g s needs %.0f sub-steps of %g s, and at most %u are taken", step,
-                std::ceil(step / stable - 1e-9), stable, most);
-  throw Failure(kBadInput,
-                scene.path() + ": " + text + ": let body '" + name + "', whose point " +
-                    bound->get("worst_point") +
-                    " bounds the step, move by tr_bdf2 or implicit_euler, soften or coarsen it, lower its "
-                    "damping, or take a shorter step");
+  throw Failure(
+      kBadInput,
+      scene.path() +
+          formatted(": /time/step: a step of %g s needs %.0f sub-steps of %g s, and at most %u are taken",
+                    step, std::ceil(step / stable - 1e-9), stable, most) +
+          ": let body '" + name + "', whose point " + bound->get("worst_point") +
+          " bounds the step, move by tr_bdf2 or implicit_euler, soften or coarsen it, lower its "
+          "damping, or take a shorter step");
 }
 
 }  // namespace cli

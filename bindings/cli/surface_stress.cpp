@@ -50,7 +50,7 @@ bool SurfaceStress::read(std::vector<float> &out) {
   const dfm_status status = dfm_body_stress(body_, uint32_t(volume_.size()), stress_.data());
   if (status == DFM_E_UNSUPPORTED) return false;
   need(status);
-  std::fill(mean_.begin(), mean_.end(), 0.0);
+  std::ranges::fill(mean_, 0.0);
   for (size_t c = 0; c < volume_.size(); ++c) {
     const double share = volume_[c] * von_mises(&stress_[6 * c]);
     for (size_t k = 0; k < 4; ++k) mean_[cells_[4 * c + k]] += share;

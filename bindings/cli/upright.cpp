@@ -42,7 +42,7 @@ Upright::Upright(const SceneFile &scene) {
 
 void Upright::at(double t, double up[3]) const {
   Vector g{0, 0, -1};
-  const auto after = std::find_if(keys_.begin(), keys_.end(), [t](const Key &k) { return k.t >= t; });
+  const auto after = std::ranges::find_if(keys_, [t](const Key &k) { return k.t >= t; });
   if (after != keys_.end()) g = after->gravity;
   else if (!keys_.empty()) g = keys_.back().gravity;
   if (after != keys_.end() && after != keys_.begin()) {

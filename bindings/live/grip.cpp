@@ -52,9 +52,7 @@ void Grip::next() { take(taken_ + 1 < int(tools_.size()) ? taken_ + 1 : -1); }
 void Grip::let_go() {
   if (taken_ < 0) return;
   cli::JsonObject line;
-  simulation_.act(line.add("do", "\"let\"")
-                      .add("tool", cli::quoted(name(size_t(taken_))))
-                      .add("speed", cli::number(speed_)));
+  simulation_.act(line.add("do", "\"let\"", "tool", cli::quoted(name(size_t(taken_))), "speed", speed_));
   taken_ = -1;
 }
 
@@ -94,12 +92,9 @@ void Grip::open(double by) {
 void Grip::update_pull() {
   const double to[3] = {to_.x, to_.y, to_.z};
   cli::JsonObject line;
-  simulation_.act(line.add("do", "\"tool\"")
-                      .add("tool", cli::quoted(name(size_t(taken_))))
-                      .add("to", cli::json_vector(to))
-                      .add("rotation", cli::json_numbers(rotation_))
-                      .add("opening", cli::number(opening_))
-                      .add("speed", cli::number(speed_)));
+  simulation_.act(line.add("do", "\"tool\"", "tool", cli::quoted(name(size_t(taken_))), "to",
+                           cli::json_vector(to), "rotation", cli::json_numbers(rotation_), "opening",
+                           opening_, "speed", speed_));
 }
 
 // The spring would swing all bodies six times a second, and the ball moves as lightly as a hundredth of them:
@@ -126,18 +121,11 @@ std::string tools_with_probe(const cli::SceneFile &scene, const render::Bounds &
   const double at[3] = {0.5 * (low.x + high.x), 0.5 * (low.y + high.y), high.z + 2 * radius};
   const double damping = 2 * std::sqrt(k * light), arm = radius * radius;
   cli::JsonObject coupling, pose, probe;
-  coupling.add("stiffness", cli::number(k))
-      .add("damping", cli::number(damping))
-      .add("turn_stiffness", cli::number(k * arm))
-      .add("turn_damping", cli::number(damping * arm))
-      .add("mass", cli::number(light))
-      .add("inertia", cli::number(light * arm));
+  coupling.add("stiffness", k, "damping", damping, "turn_stiffness", k * arm, "turn_damping", damping * arm,
+               "mass", light, "inertia", light * arm);
   pose.add("position", cli::json_vector(at));
-  probe.add("name", cli::quoted(name))
-      .add("shape", "\"sphere\"")
-      .add("radius", cli::number(radius))
-      .add("pose", pose.text())
-      .add("coupling", coupling.text());
+  probe.add("name", cli::quoted(name), "shape", "\"sphere\"", "radius", radius, "pose", pose.text(),
+            "coupling", coupling.text());
   all.push_back(probe.text());
   return cli::json_array(all);
 }

@@ -106,13 +106,9 @@ bool Pull::grab(const Vec &origin, const Vec &direction) {
   const dfm_body_info info = cli::got<dfm_body_info>(dfm_body_get_info, body.handle);
   const double rate = 2 * std::numbers::pi * 4, k = stiffness * info.mass * rate * rate;
   cli::JsonObject line;
-  line.add("do", "\"pull\"")
-      .add("body", cli::quoted(body.name))
-      .add("points", cli::json_array(patch.points))
-      .add("weights", cli::json_numbers(patch.weights))
-      .add("to", text_of(patch.middle))
-      .add("stiffness", cli::number(k))
-      .add("damping", cli::number(std::sqrt(k * info.mass)));  // half of the critical one
+  line.add("do", "\"pull\"", "body", cli::quoted(body.name), "points", cli::json_array(patch.points),
+           "weights", cli::json_numbers(patch.weights), "to", text_of(patch.middle), "stiffness", k,
+           "damping", std::sqrt(k * info.mass));  // half of the critical one
   // a model that steps itself and has no step bound takes no spring
   try {
     simulation_.act(line);
@@ -122,10 +118,8 @@ bool Pull::grab(const Vec &origin, const Vec &direction) {
     cli::JsonObject held;
     std::vector<std::string> corners;
     for (const uint32_t corner : corners_) corners.push_back(std::to_string(corner));
-    held.add("do", "\"drag\"")
-        .add("body", cli::quoted(body.name))
-        .add("corners", cli::json_array(corners))
-        .add("weights", cli::json_vector(weights_));
+    held.add("do", "\"drag\"", "body", cli::quoted(body.name), "corners", cli::json_array(corners), "weights",
+             cli::json_vector(weights_));
     return drag(held, info.mass);
   }
 }
@@ -142,7 +136,7 @@ bool Pull::grab_rigid(const std::string &name) {
     rigid_ = r.handle;
     offset_ = {};
     cli::JsonObject held;
-    held.add("do", "\"drag\"").add("rigid", cli::quoted(name)).add("place", cli::json_vector(arm_));
+    held.add("do", "\"drag\"", "rigid", cli::quoted(name), "place", cli::json_vector(arm_));
     return drag(held, def.mass);
   }
   return false;
@@ -150,9 +144,7 @@ bool Pull::grab_rigid(const std::string &name) {
 
 bool Pull::drag(cli::JsonObject &line, double mass) {
   const double rate = 2 * std::numbers::pi * 4, k = stiffness * mass * rate * rate;
-  line.add("to", text_of(to_))
-      .add("stiffness", cli::number(k))
-      .add("damping", cli::number(std::sqrt(k * mass)));  // half of the critical one
+  line.add("to", text_of(to_), "stiffness", k, "damping", std::sqrt(k * mass));  // half of the critical one
   simulation_.act(line);
   return true;
 }
@@ -161,7 +153,7 @@ void Pull::move(const Vec &to) {
   if (!holds() || (to.x == to_.x && to.y == to_.y && to.z == to_.z)) return;
   to_ = to;
   cli::JsonObject line;
-  simulation_.act(line.add("do", "\"move\"").add("to", text_of(to_ + offset_)));
+  simulation_.act(line.add("do", "\"move\"", "to", text_of(to_ + offset_)));
 }
 
 Vec Pull::place() const {

@@ -29,8 +29,6 @@ render::Vec vector(const cli::JsonValue &line, const char *key) {
   return render::vec(line.numbers(key).data());
 }
 
-const char *yes(bool x) { return x ? "true" : "false"; }
-
 }  // namespace
 
 Session::Session(const cli::Globals &globals, const std::string &scene, const std::vector<std::string> &set,
@@ -104,7 +102,7 @@ void Session::handle(const std::string &what, const cli::JsonValue &line, uint32
   } else if (what == "cut") {
     let_go();
     cli::JsonObject cut;
-    simulation_.act(cut.add("do", "\"cut\"").add("blade", list_of(line, "blade", 12)));
+    simulation_.act(cut.add("do", "\"cut\"", "blade", list_of(line, "blade", 12)));
   } else if (what == "run") {
     const cli::JsonValue *const on = line.find("on");
     running_ = on && on->kind == cli::JsonValue::literal && on->text == "true";
@@ -162,7 +160,7 @@ std::string Session::probe(uint32_t i, size_t most) const {
 
 std::string Session::brief_state(uint32_t viewer, size_t turn) const {
   cli::JsonObject out = state(kBrief);
-  out.add("you", std::to_string(viewer));
+  out.add("you", viewer);
   if (!sliders_.empty()) out.add("sliders", cli::json_array({slider_text(sliders_[turn % sliders_.size()])}));
   if (const uint32_t n = scene_.settings().nprobe)
     out.add("probes", cli::json_array({probe(uint32_t(turn % n), kBrief)}));
@@ -174,7 +172,7 @@ std::string Session::whole_state() const {
   for (const Slider &s : sliders_) sliders.push_back(slider_text(s));
   for (uint32_t i = 0; i < scene_.settings().nprobe; ++i) probes.push_back(probe(i));
   cli::JsonObject out = state();
-  out.add("sliders", cli::json_array(sliders)).add("probes", cli::json_array(probes));
+  out.add("sliders", cli::json_array(sliders), "probes", cli::json_array(probes));
   return cli::as_utf8(out.text());
 }
 
@@ -182,23 +180,17 @@ cli::JsonObject Session::state(size_t most) const {
   double up[3];
   upright_.at(dfm_world_time(scene_.world()), up);
   cli::JsonObject out;
-  out.add("scene", cli::quoted(scene_.path().substr(0, most)))
-      .add("time", cli::number(simulation_.time()))
-      .add("frame", std::to_string(teller_.number()))
-      .add("running", yes(running_))
-      .add("message", cli::quoted(message_.substr(0, most)))
-      .add("step_ms", cli::number(simulation_.step_ms()))
-      .add("real", cli::number(real_))
-      .add("control", std::to_string(viewers_.in_control()))
-      .add("viewers", std::to_string(viewers_.viewers()))
-      .add("up", cli::json_vector(up));
+  out.add("scene", cli::quoted(scene_.path().substr(0, most)), "time", simulation_.time(), "frame",
+          teller_.number(), "running", running_, "message", cli::quoted(message_.substr(0, most)), "step_ms",
+          simulation_.step_ms(), "real", real_, "control", viewers_.in_control(), "viewers",
+          viewers_.viewers(), "up", cli::json_vector(up));
   const dfm_scene_settings &settings = scene_.settings();
   if (settings.has_camera)
-    out.add("eye", cli::json_vector(settings.eye)).add("look_at", cli::json_vector(settings.look_at));
+    out.add("eye", cli::json_vector(settings.eye), "look_at", cli::json_vector(settings.look_at));
   if (pull_.holds()) {
     cli::JsonObject pull;
-    pull.add("place", text_of(pull_.place())).add("to", text_of(pull_.to()));
-    out.add("pull", pull.add("force", cli::number(pull_.force())).text());
+    pull.add("place", text_of(pull_.place()), "to", text_of(pull_.to()));
+    out.add("pull", pull.add("force", pull_.force()).text());
   }
   return out;
 }

@@ -26,7 +26,7 @@ bool Simulation::step() {
   trouble_.clear();
   if (recorder_ && step != recorded_step_) {
     cli::JsonObject line;
-    recorder_->act(line.add("do", "\"step\"").add("length", cli::number(step)).text());
+    recorder_->act(line.add("do", "\"step\"", "length", step).text());
     recorded_step_ = step;
   }
   hand_.before_step(step);

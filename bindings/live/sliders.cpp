@@ -27,7 +27,7 @@ void add_gravity(Simulation &simulation, std::vector<Slider> &out) {
   s.apply = [&simulation, way](double x) {
     const double to[3] = {x * way.x, x * way.y, x * way.z};
     cli::JsonObject line;
-    simulation.act(line.add("do", "\"gravity\"").add("to", cli::json_vector(to)));
+    simulation.act(line.add("do", "\"gravity\"", "to", cli::json_vector(to)));
   };
   out.push_back(s);
 }
@@ -41,10 +41,9 @@ void add_coefficient(Simulation &simulation, const std::string &a, const std::st
   s.high = std::max(1.5, 2 * value);
   s.apply = [&simulation, a, b, key](double x) {
     cli::JsonObject line;
-    simulation.act(line.add("do", "\"friction\"")
-                       .add("between", cli::json_array({cli::quoted(a), cli::quoted(b)}))
-                       .add("key", cli::quoted(key))
-                       .add("value", cli::number(x)));
+    simulation.act(line.add("do", "\"friction\"", "between",
+                            cli::json_array({cli::quoted(a), cli::quoted(b)}), "key", cli::quoted(key),
+                            "value", x));
   };
   out.push_back(s);
 }
@@ -109,10 +108,7 @@ void add_stiffness(Simulation &simulation, std::vector<Slider> &out) {
     s.logarithmic = true;
     s.apply = [&simulation, name = body.name](double x) {
       cli::JsonObject line;
-      simulation.act(line.add("do", "\"param\"")
-                         .add("body", cli::quoted(name))
-                         .add("key", "\"young\"")
-                         .add("value", cli::number(x)));
+      simulation.act(line.add("do", "\"param\"", "body", cli::quoted(name), "key", "\"young\"", "value", x));
     };
     out.push_back(s);
   }
@@ -143,9 +139,9 @@ void set_slider(std::vector<Slider> &sliders, const cli::JsonValue &request) {
 
 std::string slider_text(const Slider &s) {
   cli::JsonObject out;
-  out.add("name", cli::quoted(s.name)).add("label", cli::quoted(s.label));
-  out.add("value", cli::number(s.value)).add("low", cli::number(s.low)).add("high", cli::number(s.high));
-  return out.add("logarithmic", s.logarithmic ? "true" : "false").text();
+  out.add("name", cli::quoted(s.name), "label", cli::quoted(s.label), "value", s.value, "low", s.low, "high",
+          s.high);
+  return out.add("logarithmic", s.logarithmic).text();
 }
 
 }  // namespace live

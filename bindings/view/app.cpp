@@ -218,7 +218,7 @@ void App::cut(const double blade[12]) {
   if (replay_) return;
   attempt([&] {
     cli::JsonObject line;
-    stage_->simulation.act(line.add("do", "\"cut\"").add("blade", cli::json_numbers({blade, 12})));
+    stage_->simulation.act(line.add("do", "\"cut\"", "blade", cli::json_numbers({blade, 12})));
   });
 }
 
@@ -398,10 +398,8 @@ void App::shot(const std::string &name) {
                                           .add("torque", live::text_of(felt.torque))
                                           .text());
     }
-    row.add("shot", cli::quoted(path))
-        .add("t", cli::number(stage_->simulation.time()))
-        .add("state_hash", cli::quoted(hash))
-        .add("com", bodies.text());
+    row.add("shot", cli::quoted(path), "t", stage_->simulation.time(), "state_hash", cli::quoted(hash), "com",
+            bodies.text());
     if (stage_->grip.count() > 0) row.add("tools", tools.text());
     std::printf("%s\n", row.text().c_str());
   } else if (!globals_.quiet) {

@@ -135,7 +135,7 @@ void Remote::press(int button) {
   }
   pulled_ = at.origin + at.direction * far;
   send_request("grab", [&](cli::JsonObject &r) {
-    r.add("from", live::text_of(at.origin)).add("along", live::text_of(at.direction));
+    r.add("from", live::text_of(at.origin), "along", live::text_of(at.direction));
   });
 }
 
@@ -150,8 +150,7 @@ void Remote::pull_to_mouse() {
 
 void Remote::set_slider(const std::string &name, double value) {
   send_request(
-      "slider",
-      [&](cli::JsonObject &r) { r.add("name", cli::quoted(name)).add("value", cli::number(value)); },
+      "slider", [&](cli::JsonObject &r) { r.add("name", cli::quoted(name), "value", value); },
       "slider " + name);
 }
 
@@ -302,7 +301,7 @@ void Remote::shot(const std::string &name) {
   } else {
     cli::JsonObject row, middles, plotted;
     size_t triangles = 0;
-    for (const auto &[title, plot] : plots_) plotted.add(title, std::to_string(plot.times.size()));
+    for (const auto &[title, plot] : plots_) plotted.add(title, plot.times.size());
     for (const auto &[number, body] : receiver_.scene().meshes()) {
       const auto *const m = body.drawn();
       if (!m || m->rigid || !receiver_.scene().present(number)) continue;
@@ -311,13 +310,9 @@ void Remote::shot(const std::string &name) {
       middles.add(m->name, cli::json_vector(sum));
       triangles += m->triangles.size() / 3;
     }
-    row.add("shot", cli::quoted(path))
-        .add("t", cli::number(receiver_.scene().time()))
-        .add("frame", std::to_string(receiver_.scene().frame()))
-        .add("lost", std::to_string(receiver_.lost()))
-        .add("middle", middles.text())
-        .add("triangles", std::to_string(triangles))
-        .add("plotted", plotted.text());
+    row.add("shot", cli::quoted(path), "t", receiver_.scene().time(), "frame", receiver_.scene().frame(),
+            "lost", receiver_.lost(), "middle", middles.text(), "triangles", triangles, "plotted",
+            plotted.text());
     std::printf("%s\n", row.text().c_str());
   }
   std::fflush(stdout);

@@ -40,7 +40,7 @@ class Page final : public live::Viewers {
   // What a scene may choose from goes along, as JSON; a scene that was refused shows nothing.
   void join(const std::string &models, const std::string &laws) const {
     cli::JsonObject out;
-    give_text(out.add("you", "1").add("models", models).add("laws", laws).text().c_str());
+    give_text(out.add("you", "1", "models", models, "laws", laws).text().c_str());
     if (!whole_.empty()) copy_bytes(whole_.data(), whole_.size());
   }
   void add_request(const char *text) { requests_.push_back({1, text}); }
@@ -82,7 +82,7 @@ class Rig {
   }
 
   static void refuse(const std::exception &e) {
-    give_text(cli::JsonObject().add("refused", cli::quoted(e.what())).text().c_str());
+    give_text(cli::json_object("refused", cli::quoted(e.what())).c_str());
   }
 
   // A decade to both sides, as far as the law goes; what is zero, up to one.
@@ -127,9 +127,9 @@ class Rig {
       for (const std::string &name : result.columns) columns.push_back(cli::quoted(name));
       for (const std::vector<double> &row : result.rows) rows.push_back(cli::json_numbers(row));
       cli::JsonObject out;
-      out.add("law", cli::quoted(law.type().id)).add("message", cli::quoted(result.stopped));
-      out.add("normal", cli::number(law.normal_force())).add("steps", std::to_string(result.steps));
-      out.add("sliders", cli::json_array(sliders)).add("columns", cli::json_array(columns));
+      out.add("law", cli::quoted(law.type().id), "message", cli::quoted(result.stopped), "normal",
+              law.normal_force(), "steps", result.steps, "sliders", cli::json_array(sliders), "columns",
+              cli::json_array(columns));
       give_text(out.add("rows", cli::json_array(rows)).text().c_str());
     } catch (const std::exception &e) {
       refuse(e);
@@ -175,7 +175,7 @@ EMSCRIPTEN_KEEPALIVE bool deform_open(const char *path) {
         std::make_unique<live::Session>(web::globals(), path, std::vector<std::string>{}, web::page, true);
     return true;
   } catch (const std::exception &e) {
-    give_text(cli::JsonObject().add("refused", cli::quoted(e.what())).text().c_str());
+    give_text(cli::json_object("refused", cli::quoted(e.what())).c_str());
     return false;
   }
 }

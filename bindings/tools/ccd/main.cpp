@@ -75,7 +75,7 @@ class QueryFile {
   }
 
   int column(const std::string &name, bool needed) const {
-    const auto found = std::find(names_.begin(), names_.end(), name);
+    const auto found = std::ranges::find(names_, name);
     if (found != names_.end()) return int(found - names_.begin());
     if (!needed) return -1;
     std::vector<std::string> strange = names_;  // a right name is not a misspelt one
@@ -140,7 +140,7 @@ struct Tally {
 };
 
 Tally run_queries(const CcdOptions &options, const std::vector<CcdQuery> &queries, std::string &rows) {
-  const auto method = std::find(kRoots.begin(), kRoots.end(), options.root) - kRoots.begin();
+  const auto method = std::ranges::find(kRoots, options.root) - kRoots.begin();
   const dfm_toi_options toi = {sizeof toi, int32_t(method), options.tolerance, options.separation, 0};
   Tally tally;
   std::vector<double> times(queries.size());
@@ -180,20 +180,14 @@ Tally run_queries(const CcdOptions &options, const std::vector<CcdQuery> &querie
 void print(const CcdOptions &options, const Globals &globals, size_t n, const Tally &t) {
   const double per = n ? 1.0 / double(n) : 0, mean = per * double(t.evaluations), ns = per * 1e9 * t.seconds;
   if (globals.json) {
-    const auto whole = [](uint64_t x) { return std::to_string(x); };
     JsonObject out, work;
-    work.add("mean", number(mean)).add("max", whole(t.most));
-    out.add("file", quoted(options.file))
-        .add("root", quoted(options.root))
-        .add("queries", whole(n))
-        .add("edge_edge", whole(t.edges));
-    out.add("hits", whole(t.hits)).add("evaluations", work.text()).add("ns_per_query", number(ns));
+    work.add("mean", mean, "max", t.most);
+    out.add("file", quoted(options.file), "root", quoted(options.root), "queries", n, "edge_edge", t.edges,
+            "hits", t.hits, "evaluations", work.text(), "ns_per_query", ns);
     if (t.labeled) {
       JsonObject labels;
-      labels.add("queries", whole(t.labeled))
-          .add("missed", whole(t.missed))
-          .add("false", whole(t.false_hits));
-      out.add("labels", labels.add("late", whole(t.late)).add("late_by_max", number(t.latest)).text());
+      labels.add("queries", t.labeled, "missed", t.missed, "false", t.false_hits);
+      out.add("labels", labels.add("late", t.late, "late_by_max", t.latest).text());
     }
     std::fputs(indented(out.text()).c_str(), stdout);
   } else if (!globals.quiet) {
@@ -210,7 +204,7 @@ void print(const CcdOptions &options, const Globals &globals, size_t n, const Ta
 }
 
 int ccd(const CcdOptions &options, const Globals &globals) {
-  if (std::find(kRoots.begin(), kRoots.end(), options.root) == kRoots.end())
+  if (std::ranges::find(kRoots, options.root) == kRoots.end())
     throw Failure(kBadInput, "--root is \"" + options.root +
                                  "\", expected bisection, regula_falsi, brent or conservative" +
                                  did_you_mean(options.root, kRoots));

@@ -51,7 +51,7 @@ std::string Process::difference(const Process &later) const {
   for (const auto *both : {&later.environment_, &environment_})
     for (const std::string &entry : *both) {
       const auto &other = both == &environment_ ? later.environment_ : environment_;
-      if (std::find(other.begin(), other.end(), entry) == other.end())
+      if (std::ranges::find(other, entry) == other.end())
         return text("changes the environment (%s); use parameters instead",
                     entry.substr(0, entry.find('=')).c_str());
     }

@@ -120,7 +120,7 @@ std::vector<std::string> exported(const std::string &file) {
       continue;
     if (!s.name.empty()) out.push_back(s.name);
   }
-  std::sort(out.begin(), out.end());
+  std::ranges::sort(out);
   return out;
 }
 

@@ -96,7 +96,7 @@ std::vector<std::string> exported(const std::string &file) {
     if (name >= bytes.size()) not_pe();
     out.emplace_back(&bytes[name], strnlen(&bytes[name], bytes.size() - name));
   }
-  std::sort(out.begin(), out.end());
+  std::ranges::sort(out);
   return out;
 }
 

@@ -308,7 +308,7 @@ std::vector<double> steady_force(const Law &law, const Scales &scales, const std
     if (law.needs(DFM_NEED_FN)) b.fn[i] = scales.fn;
     b.slip(i, speeds[i], 0);
   }
-  const double h = 1.0 / 240, slowest = *std::min_element(speeds.begin(), speeds.end());
+  const double h = 1.0 / 240, slowest = std::ranges::min(speeds);
   const int least = law.nstate ? static_cast<int>(std::min(30000.0, 40 * scales.z / (slowest * h) + 50)) : 1;
   for (int i = 0; i < least; ++i) {
     b.must(h);

@@ -192,8 +192,7 @@ class Rules {
   Report run() {
     if (!globals_.json) std::printf("%s\n", request_.file.c_str());
     list_types();
-    const bool usable = std::all_of(report_.types.begin(), report_.types.end(),
-                                    [](const TypeName &type) { return type.usable; });
+    const bool usable = std::ranges::all_of(report_.types, [](const TypeName &type) { return type.usable; });
     for (const Rule *rule : wanted_)
       if (!rule->by_type) one(report_.file, *rule, -1, !usable && uses_types(*rule) ? kUnusable : nullptr);
       else if (report_.types.empty()) add(report_.file, {rule, {Result::skip, kNotLoaded}, 0});
@@ -242,9 +241,7 @@ class Rules {
                                types.substr(flag + 2, end - flag - 2)});
     }
   }
-  bool wants(const char *id) const {
-    return std::find(wanted_.begin(), wanted_.end(), find_rule(id)) != wanted_.end();
-  }
+  bool wants(const char *id) const { return std::ranges::find(wanted_, find_rule(id)) != wanted_.end(); }
   // why: not to be run at all
   void one(std::vector<Line> &to, const Rule &rule, int type, const char *why = nullptr) {
     // What it was that crashed V06 says: it names the array.
@@ -288,13 +285,9 @@ class Rules {
 std::string json_lines(const std::vector<Line> &lines) {
   std::vector<std::string> out;
   for (const Line &l : lines)
-    out.push_back(JsonObject()
-                      .add("id", quoted(l.rule->id))
-                      .add("title", quoted(l.rule->title))
-                      .add("result", quoted(word(l.verdict.result)))
-                      .add("detail", quoted(l.verdict.detail))
-                      .add("cpu_s", number(std::round(1e4 * l.seconds) / 1e4))
-                      .text());
+    out.push_back(json_object("id", quoted(l.rule->id), "title", quoted(l.rule->title), "result",
+                              quoted(word(l.verdict.result)), "detail", quoted(l.verdict.detail), "cpu_s",
+                              std::round(1e4 * l.seconds) / 1e4));
   return json_array(out);
 }
 
@@ -308,19 +301,11 @@ int print_report(const Globals &globals, const Request &request, const Report &r
   if (globals.json) {
     std::vector<std::string> types;
     for (size_t t = 0; t < report.types.size(); ++t)
-      types.push_back(JsonObject()
-                          .add("kind", quoted(kind_name(report.types[t].kind)))
-                          .add("id", quoted(report.types[t].id))
-                          .add("rules", json_lines(report.by_type[t]))
-                          .text());
+      types.push_back(json_object("kind", quoted(kind_name(report.types[t].kind)), "id",
+                                  quoted(report.types[t].id), "rules", json_lines(report.by_type[t])));
     JsonObject o;
-    o.add("file", quoted(request.file))
-        .add("seed", std::to_string(request.seed))
-        .add("rules", json_lines(report.file))
-        .add("types", json_array(types));
-    o.add("passed", std::to_string(count[0]))
-        .add("failed", std::to_string(count[1]))
-        .add("skipped", std::to_string(count[2]));
+    o.add("file", quoted(request.file), "seed", request.seed, "rules", json_lines(report.file), "types",
+          json_array(types), "passed", count[0], "failed", count[1], "skipped", count[2]);
     std::fputs(indented(o.text()).c_str(), stdout);
     return code;
   }
@@ -366,7 +351,7 @@ std::string file_of(const std::string &text, const Globals &globals) {
   if (const auto whole = file_of_id.find(text); whole != file_of_id.end()) return whole->second;
   std::erase_if(file_of_id, [&](const auto &one) { return !one.first.ends_with("." + text); });
   const auto elsewhere = [&](const auto &one) { return one.second != file_of_id.begin()->second; };
-  if (std::any_of(file_of_id.begin(), file_of_id.end(), elsewhere))
+  if (std::ranges::any_of(file_of_id, elsewhere))
     throw Failure(kBadInput, text + ": several plugins have this short name; give the id, as " +
                                  file_of_id.begin()->first);
   return file_of_id.empty() ? text : file_of_id.begin()->second;

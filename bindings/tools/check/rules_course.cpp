@@ -28,7 +28,7 @@ std::string state_stays_bounded(const Subject &subject) {
     std::vector<double> before(n, 0.0), block(n, 0.0);
     for (int k = 0; k < kBlocks; ++k) {
       Random random(subject.seed);
-      std::fill(block.begin(), block.end(), 0.0);
+      std::ranges::fill(block, 0.0);
       stage("block %d of %d steps of %g s", k + 1, kSteps, h);
       for (int step = 0; step < kSteps; ++step) {
         b.press(s.fn);

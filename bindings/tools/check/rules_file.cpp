@@ -20,7 +20,7 @@ namespace cli::check {
 
 std::string exports_one_symbol(const Subject &subject) {
   std::vector<std::string> names = exported(subject.file);
-  const auto entry = std::find(names.begin(), names.end(), "dfm_plugin_entry");
+  const auto entry = std::ranges::find(names, "dfm_plugin_entry");
   if (entry == names.end())
     broken("it exports no dfm_plugin_entry; define the entry of deform/plugin.h with DFM_EXPORT");
   names.erase(entry);
@@ -99,7 +99,7 @@ bool reverse_dns(const char *id) {
 void effects_known(const dfm_type &type) {
   const std::vector<std::string> known(std::begin(kEffects), std::end(kEffects));
   for (const char *const *e = type.effects; e && *e; ++e) {
-    if (std::strchr(*e, '.') || std::find(known.begin(), known.end(), *e) != known.end()) continue;
+    if (std::strchr(*e, '.') || std::ranges::find(known, *e) != known.end()) continue;
     broken(
         "it promises \"%s\", which is not the name of an effect%s; write an effect of your own as "
         "\"vendor.word\"",

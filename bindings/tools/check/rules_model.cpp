@@ -343,7 +343,7 @@ std::string dampers_take_energy(const Subject &subject) {
     const Numbers still = body.forces();
     bool changed = false;
     for (int round = 0; round < 8; ++round) {
-      std::fill(body.v.begin(), body.v.end(), 0.0);
+      std::ranges::fill(body.v, 0.0);
       body.shake(0, 0.1, random);
       Numbers f = body.forces();
       double power = 0, size = 0;

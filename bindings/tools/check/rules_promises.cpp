@@ -230,7 +230,7 @@ std::string breaks_away(const Subject &subject) {
         slides[i] = slides[i] || masses.v[i] > begun;
         if (!slides[i]) peak[i] = std::max(peak[i], masses.resist[i]);
       }
-      if (std::all_of(slides.begin(), slides.end(), [](bool b) { return b; })) break;
+      if (std::ranges::all_of(slides, [](bool b) { return b; })) break;
     }
     *why = text(
         "the peak is %.4g N at the slowest ramp and %.4g N at the fastest, above a kinetic level of %.4g N",

@@ -102,8 +102,7 @@ void StaticsLocked::protect(bool writable) const {
 }
 
 bool StaticsLocked::hold(const void *at) const {
-  return std::any_of(ranges_.begin(), ranges_.end(),
-                     [&](const Range &r) { return at >= r.begin && at < r.end; });
+  return std::ranges::any_of(ranges_, [&](const Range &r) { return at >= r.begin && at < r.end; });
 }
 
 // ---- fenced arrays ----------------------------------------------------------------------------------------
@@ -126,7 +125,7 @@ Fenced::Fenced(const char *name, size_t bytes, Place place) : name_(name), bytes
 }
 
 Fenced::~Fenced() {
-  all.erase(std::find(all.begin(), all.end(), this));
+  all.erase(std::ranges::find(all, this));
   pages::release(pages_, span_);
 }
 

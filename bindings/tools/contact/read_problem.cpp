@@ -67,14 +67,14 @@ void condense(const std::vector<size_t> &own, const std::vector<std::vector<Entr
     place[own[k]] = k;
     for (const Entries::One &e : h[own[k]]) columns.push_back(e.column);
   }
-  std::sort(columns.begin(), columns.end());
+  std::ranges::sort(columns);
   columns.erase(std::unique(columns.begin(), columns.end()), columns.end());
   if (columns.empty()) return;
   Matrix l(n, n), x(n, columns.size() + 1);  // L; L^-1 (H, f)
   for (size_t k = 0; k < n; ++k) {
     for (const Entries::One &e : m[own[k]]) l(k, place[e.column]) += e.value;
     for (const Entries::One &e : h[own[k]])
-      x(k, size_t(std::lower_bound(columns.begin(), columns.end(), e.column) - columns.begin())) += e.value;
+      x(k, size_t(std::ranges::lower_bound(columns, e.column) - columns.begin())) += e.value;
     x(k, columns.size()) = f[own[k]];
   }
   factor(l);

@@ -137,7 +137,7 @@ LocalProblem Replay::form() {
     const uint32_t i = c / 3;
     Vec3 unit;
     unit[int(c % 3)] = 1;
-    std::fill(rows.y.begin(), rows.y.end(), 0.0);
+    std::ranges::fill(rows.y, 0.0);
     rows.apply(i, unit);
     y = rows.y;
     const Vec3 push = load3(&rows.frame[size_t{9} * i + 3 * (c % 3)]);

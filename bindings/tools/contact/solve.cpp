@@ -90,7 +90,7 @@ class Solve final : public SolveLaws {
     rows_.impulse.assign(3 * size_t{n_}, 0.0);
     rows_.y_free.assign(rows_.y.begin(), rows_.y.end());
     state_.resize(n_, 0);
-    std::fill(state_.form.begin(), state_.form.end(), uint8_t{kSetValuedLaw});
+    std::ranges::fill(state_.form, uint8_t{kSetValuedLaw});
     for (uint32_t i = 0; i < n_; ++i) {  // Coulomb's law: limits in proportion to the normal force
       state_.fn[i] = 1;
       state_.limit[i] = problem.mu[i];
@@ -162,7 +162,7 @@ class Solve final : public SolveLaws {
 
   void set_response(double added) {
     const Matrix &W = problem_.W;
-    const double most = *std::max_element(W.value.begin(), W.value.end());
+    const double most = std::ranges::max(W.value);
     rows_.set_response(rows_.blocks[0], false, [&](double *to) {
       for (size_t r = 0; r < W.rows; ++r)
         for (size_t c = 0; c < W.rows; ++c) *to++ = 0.5 * (W(r, c) + W(c, r)) + (r == c ? added * most : 0);

@@ -19,9 +19,7 @@ std::string lacks(const Subject &subject, const Offered &model) {
   for (const SubjectBody &body : subject.bodies)
     for (const std::string &effect : body.effects) {
       const auto is = [&](const std::string &name) { return name == effect; };
-      if (std::none_of(std::begin(kOwnMeans), std::end(kOwnMeans), is) &&
-          std::none_of(model.effects.begin(), model.effects.end(), is))
-        return effect;
+      if (std::ranges::none_of(kOwnMeans, is) && std::ranges::none_of(model.effects, is)) return effect;
     }
   return "";
 }
@@ -60,7 +58,7 @@ class Finder {
 
   template <class Fill>
   bool axis(const std::string &name, std::vector<std::string> kinds, std::string reason, Fill fill) {
-    if (!wanted_.empty() && std::find(wanted_.begin(), wanted_.end(), name) == wanted_.end())
+    if (!wanted_.empty() && std::ranges::find(wanted_, name) == wanted_.end())
       reason = "not asked for (--axes)";
     if (reason.empty()) fill();
     out_.axes.push_back({name, reason, std::move(kinds)});
@@ -117,7 +115,7 @@ class Finder {
       out_.reference_why = "the scene's own models: corotational_fem is not loaded";
     } else if (const std::string effect = lacks(s_, *corot); !effect.empty()) {
       out_.reference_why = "the scene's own models: corotational_fem does not offer " + effect;
-    } else if (!wanted_.empty() && std::find(wanted_.begin(), wanted_.end(), "model") == wanted_.end()) {
+    } else if (!wanted_.empty() && std::ranges::find(wanted_, "model") == wanted_.end()) {
       out_.reference_why = "the scene's own models: the axis model is not asked for";
     } else {
       out_.reference_model = "corotational_fem";
@@ -194,8 +192,7 @@ class Finder {
       return model && (kind == Cells::hexahedra ? model->lattices : model->second_order) &&
              lacks(s_, *model).empty();
     };
-    if (std::all_of(s_.bodies.begin(), s_.bodies.end(), [&](auto &body) { return takes(body.model); }))
-      return true;
+    if (std::ranges::all_of(s_.bodies, [&](auto &body) { return takes(body.model); })) return true;
     knobs.model = out_.reference_model;
     return takes(knobs.model);
   }
@@ -203,13 +200,13 @@ class Finder {
   // Only first-order tetrahedra can be cut or torn.
   bool may_be_cut() const {
     const auto any = [](const std::vector<JsonValue> &rows, const char *key) {
-      return std::any_of(rows.begin(), rows.end(), [&](auto &row) { return row.find(key); });
+      return std::ranges::any_of(rows, [&](auto &row) { return row.find(key); });
     };
     const JsonValue *const materials = s_.find("/materials");
     return !s_.scene.list("cuts").empty() || any(s_.scene.list("tools"), "cuts") ||
            any(s_.scene.list("bodies"), "separate") || any(s_.scene.list("bodies"), "cut_delay") ||
-           (materials && std::any_of(materials->members.begin(), materials->members.end(),
-                                     [](const JsonMember &m) { return m.value.find("tear"); }));
+           (materials && std::ranges::any_of(materials->members,
+                                             [](const JsonMember &m) { return m.value.find("tear"); }));
   }
 
   std::string kinds_reason() const {
@@ -373,7 +370,7 @@ const std::vector<std::string> &axis_names() {
 Axes find_axes(const Subject &subject, const std::string &mesh_left_out,
                const std::vector<std::string> &wanted) {
   for (const std::string &name : wanted)
-    if (std::find(axis_names().begin(), axis_names().end(), name) == axis_names().end()) {
+    if (std::ranges::find(axis_names(), name) == axis_names().end()) {
       std::string all;
       for (const std::string &n : axis_names()) all += (all.empty() ? "" : ", ") + n;
       throw Failure(kBadInput, "--axes: there is no axis \"" + name + "\", expected " + all +

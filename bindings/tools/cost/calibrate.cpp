@@ -359,11 +359,11 @@ class Calibration {
         &models_));
     if (only.empty()) return;
     for (const std::string &name : only)
-      if (std::none_of(models_.begin(), models_.end(), [&](auto &m) { return named(m.id, name); }))
+      if (std::ranges::none_of(models_, [&](auto &m) { return named(m.id, name); }))
         throw Failure(kBadInput,
                       "--model: no loaded plugin offers the model \"" + name + "\"; see: deform plugin list");
     std::erase_if(models_, [&](const Model &m) {
-      return std::none_of(only.begin(), only.end(), [&](auto &name) { return named(m.id, name); });
+      return std::ranges::none_of(only, [&](auto &name) { return named(m.id, name); });
     });
   }
 
@@ -388,12 +388,8 @@ class Calibration {
     }
     if (rows.empty()) throw Failure(kBadInput, "no model could be measured, so no costs are written");
     for (std::string &row : kept_rows(out, machine, measured)) rows.push_back(std::move(row));
-    return JsonObject()
-        .add("format", quoted("deform-costs"))
-        .add("version", "4")
-        .add("machine", quoted(machine))
-        .add("models", json_array(rows))
-        .text();
+    return json_object("format", quoted("deform-costs"), "version", "4", "machine", quoted(machine), "models",
+                       json_array(rows));
   }
 
  private:
@@ -427,7 +423,7 @@ class Calibration {
       costs.add("implicit_euler", sizes(id, lattice, DFM_INTEGRATOR_IMPLICIT_EULER, false));
       costs.add("tr_bdf2", sizes(id, lattice, DFM_INTEGRATOR_TR_BDF2, false));
     }
-    out.add("wave_steps", number(itself ? 0 : bar.bound() / bar.wave_time())).add("costs", costs.text());
+    out.add("wave_steps", itself ? 0 : bar.bound() / bar.wave_time(), "costs", costs.text());
   }
 
   static Setting bound_of(const std::string &id) {
@@ -443,17 +439,15 @@ class Calibration {
     const bool itself = !std::isfinite(Bar(context_, bound_of(id)).stable_step());
     const int32_t still = itself ? DFM_INTEGRATOR_AUTO : DFM_INTEGRATOR_IMPLICIT_EULER;
     JsonObject errors;
-    errors.add("bends_little", number(difference(bent(context_, id, still, kLittle), reference_.little)))
-        .add("bends_far", number(difference(bent(context_, id, still, kFar), reference_.far)))
-        .add("turns", number(difference(turned(context_, id), reference_.turned)))
-        .add("lies", number(difference(lying(context_, id, still), reference_.lying)));
+    errors.add("bends_little", difference(bent(context_, id, still, kLittle), reference_.little))
+        .add("bends_far", difference(bent(context_, id, still, kFar), reference_.far))
+        .add("turns", difference(turned(context_, id), reference_.turned))
+        .add("lies", difference(lying(context_, id, still), reference_.lying));
     const Dent dent = dented(context_, id, still);
-    errors.add("dents", number(difference(dent.displacements, reference_.dented.displacements)))
-        .add("dent_force", number(force_difference(dent.force, reference_.dented.force)));
+    errors.add("dents", difference(dent.displacements, reference_.dented.displacements))
+        .add("dent_force", force_difference(dent.force, reference_.dented.force));
     JsonObject row;
-    row.add("model", quoted(short_name(id)))
-        .add("steps_itself", itself ? "true" : "false")
-        .add("errors", errors.text());
+    row.add("model", quoted(short_name(id)), "steps_itself", itself, "errors", errors.text());
     add_cells(id, false, itself, row);
     if (!m.lattices) return row.text();
     JsonObject hexahedra;
@@ -485,7 +479,7 @@ class Calibration {
         const bool explicit_time = integrator == DFM_INTEGRATOR_SYMPLECTIC_EULER && !itself;
         const auto [points, ns] = measured(explicit_time ? 0 : kFrame);
         JsonObject row;
-        row.add("points", std::to_string(points)).add("ns_per_point", ns);
+        row.add("points", points, "ns_per_point", ns);
         if (!explicit_time) row.add("short_ns_per_point", measured(kShort).second);
         rows.push_back(row.text());
       }

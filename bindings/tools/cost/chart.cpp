@@ -6,6 +6,7 @@
 #include <limits>
 #include <map>
 
+#include "messages.h"
 #include "report.h"
 
 namespace cli::cost {
@@ -40,11 +41,7 @@ Scale scale_of(std::vector<double> values, double from, double to) {
   return {lo, std::max(hi, lo + 1), from, to};
 }
 
-std::string plain(double x) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%.10g", x);
-  return text;
-}
+std::string plain(double x) { return formatted("%.10g", x); }
 
 class Chart {
  public:

@@ -1,6 +1,5 @@
-#include <cstdio>
-
 #include "chart.h"
+#include "messages.h"
 
 namespace cli::cost {
 namespace {
@@ -33,17 +32,11 @@ class Svg : public Canvas {
   }
 
  private:
-  static std::string number(double x) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%.1f", x);
-    return text;
-  }
+  static std::string number(double x) { return formatted("%.1f", x); }
   static std::string at(double x, double y) { return number(x) + " " + number(y); }
   static std::string color(Ink ink) {
-    char text[16];
-    std::snprintf(text, sizeof text, "#%02x%02x%02x", unsigned(255 * ink.r + 0.5f),
-                  unsigned(255 * ink.g + 0.5f), unsigned(255 * ink.b + 0.5f));
-    return text;
+    return formatted("#%02x%02x%02x", unsigned(255 * ink.r + 0.5f), unsigned(255 * ink.g + 0.5f),
+                     unsigned(255 * ink.b + 0.5f));
   }
   std::string out_;
 };

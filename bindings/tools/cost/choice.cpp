@@ -2,9 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <cstdlib>
 #include <set>
+
+#include "messages.h"
 
 namespace cli::cost {
 namespace {
@@ -16,8 +17,7 @@ std::string law_params(const JsonValue &rule, const std::string &law) {
   const JsonValue *const params = rule.find("params");
   JsonObject out;
   for (const JsonMember &m : params ? params->members : std::vector<JsonMember>()) {
-    const bool shared = std::any_of(std::begin(kSharedLawKeys), std::end(kSharedLawKeys),
-                                    [&](const char *key) { return m.name == key; });
+    const bool shared = std::ranges::any_of(kSharedLawKeys, [&](const char *key) { return m.name == key; });
     // dahl has neither a static coefficient nor a viscous part
     const bool dahl = law == "dahl" && m.name != "mu" && m.name != "mu_C";
     if (law != "none" && shared && !dahl) out.add(m.name, json_text(m.value));
@@ -82,11 +82,7 @@ bool has_hexahedra(const Subject &subject, size_t i) {
   return subject.find(body + "/lattice") || subject.word(body + "/mesh/make", "") == "bricks";
 }
 
-std::string seconds(double h) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%.6g", h);
-  return text;
-}
+std::string seconds(double h) { return formatted("%.6g", h); }
 
 Settings settings_of(const Subject &subject, const Knobs &knobs) {
   Settings out;
@@ -127,11 +123,7 @@ std::string label_of(const Knobs &knobs) {
   else if (!knobs.step.empty()) add(step);
   if (knobs.kind == Cells::second_order) add("second-order tetrahedra");
   if (knobs.kind == Cells::hexahedra) add("lattice");
-  if (knobs.cells != 1) {
-    char text[40];
-    std::snprintf(text, sizeof text, "cells x%.3g", knobs.cells);
-    add(text);
-  }
+  if (knobs.cells != 1) add(formatted("cells x%.3g", knobs.cells));
   if (!knobs.tolerance.empty()) add("tolerance " + knobs.tolerance + " m/s");
   if (!knobs.law.empty()) add("law " + knobs.law);
   if (!knobs.self.empty()) add("self " + (knobs.self == "\"auto\"" ? "auto" : knobs.self));

@@ -65,7 +65,7 @@ std::vector<std::string> names_of(const JsonValue &plan, const char *list) {
 }
 
 bool is_in(const std::vector<std::string> &names, const std::string &name) {
-  return std::find(names.begin(), names.end(), name) != names.end();
+  return std::ranges::find(names, name) != names.end();
 }
 
 bool planned(const JsonValue &plan, const std::string &effect) {
@@ -156,8 +156,8 @@ class Meter {
       whole[i] = a / steps;
       difference[i] = (a - b) / steps;
     }
-    std::sort(difference.begin(), difference.end());
-    std::sort(whole.begin(), whole.end());
+    std::ranges::sort(difference);
+    std::ranges::sort(whole);
     out.median = difference[kPairs / 2];
     out.low = difference[kOutside];
     out.high = difference[kPairs - 1 - kOutside];

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <cstdio>
 
 #include "chart.h"
 #include "file.h"
+#include "messages.h"
 #include "report.h"
 
 namespace cli::cost {
@@ -43,11 +43,7 @@ std::string base64(const std::string &bytes) {
   return out;
 }
 
-std::string figure_3(double x) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g", x);
-  return std::isfinite(x) ? text : "-";
-}
+std::string figure_3(double x) { return std::isfinite(x) ? formatted("%.3g", x) : "-"; }
 
 std::string cells(const std::string &label, double error, const Row &row) {
   return "<td class=\"n\">" + percent(error) + "</td><td class=\"n\">" + figure_3(row.cpu_per_s) +
@@ -86,7 +82,7 @@ std::string pictures(const Study &study) {
   for (size_t k = 0; k < study.front.size(); ++k)
     if (study.front[k] != 0) shown.emplace_back(study.front[k], "front " + std::to_string(k + 1));
   const auto listed = [&](size_t i) {
-    return std::any_of(shown.begin(), shown.end(), [&](const auto &one) { return one.first == i; });
+    return std::ranges::any_of(shown, [&](const auto &one) { return one.first == i; });
   };
   for (const size_t i : study.own_mesh.front)
     if (!listed(i)) shown.emplace_back(i, "on this mesh");

@@ -46,9 +46,8 @@ Settings settings_of_file(const Subject &subject, const Row &row) {
   const Settings own = own_settings(row);
   if (own.empty()) return {};
   Settings out = subject.planned;
-  std::erase_if(out, [&](auto &s) {
-    return std::any_of(own.begin(), own.end(), [&](auto &o) { return o.first == s.first; });
-  });
+  std::erase_if(
+      out, [&](auto &s) { return std::ranges::any_of(own, [&](auto &o) { return o.first == s.first; }); });
   out.insert(out.end(), own.begin(), own.end());
   return out;
 }

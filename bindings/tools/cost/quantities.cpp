@@ -158,7 +158,7 @@ Quantities read_quantities(const std::string &folder) {
 
 void value_at(const Quantity &q, double t, double *values, double *rates) {
   const size_t n = q.t.size();
-  size_t i = size_t(std::upper_bound(q.t.begin(), q.t.end(), t) - q.t.begin());
+  size_t i = size_t(std::ranges::upper_bound(q.t, t) - q.t.begin());
   i = std::clamp<size_t>(i, 1, n > 1 ? n - 1 : 1) - 1;
   for (unsigned k = 0; k < q.width; ++k) {
     const double a = q.values[i * q.width + k];

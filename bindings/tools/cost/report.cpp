@@ -14,15 +14,9 @@ namespace {
 
 constexpr size_t kNamed = 6;  // choices in a line that lists them
 
-std::string formatted(const char *format, double x) {
-  char text[64];
-  std::snprintf(text, sizeof text, format, x);
-  return text;
-}
-
 std::string error_json(const std::map<std::string, double> &error) {
   JsonObject out;
-  for (const auto &[name, e] : error) out.add(name, number(e));
+  for (const auto &[name, e] : error) out.add(name, e);
   return out.text();
 }
 
@@ -32,10 +26,8 @@ const char *word_of(Outcome::State state) {
 }
 
 std::string line_of(const Row &row, double error) {
-  char figures[80];
-  std::snprintf(figures, sizeof figures, "  %8s %9.3g%s ", percent(error).c_str(), row.cpu_per_s,
-                row.alone ? " " : "~");
-  return figures + row.job.label + "\n";
+  return formatted("  %8s %9.3g%s ", percent(error).c_str(), row.cpu_per_s, row.alone ? " " : "~") +
+         row.job.label + "\n";
 }
 
 std::string choice_json(const Subject &subject, const Study &study, size_t i) {
@@ -43,22 +35,18 @@ std::string choice_json(const Subject &subject, const Study &study, size_t i) {
   const Outcome &o = row.job.outcome;
   const Described d = describe(subject, row);
   JsonObject out;
-  out.add("model", quoted(d.model)).add("integrator", quoted(d.integrator)).add("step", number(d.step));
-  out.add("cells", number(o.cells)).add("law", quoted(d.law));
-  out.add("precision", quoted(d.precision)).add("error", error_json(row.error));
-  out.add("cpu_s_per_s", row.cpu_per_s > 0 ? number(row.cpu_per_s) : "null");
-  out.add("unstable", o.state == Outcome::unstable ? "true" : "false");
-  out.add("label", quoted(row.job.label))
-      .add("state", quoted(word_of(o.state)))
-      .add("why", quoted(o.sentence));
-  out.add("axes", json_words(row.candidate.axes)).add("headline", number(row.headline));
-  out.add("timed_alone", row.alone ? "true" : "false");
-  out.add("steps", number(o.steps)).add("took_s", number(o.took));
+  out.add("model", quoted(d.model), "integrator", quoted(d.integrator), "step", d.step);
+  out.add("cells", o.cells, "law", quoted(d.law), "precision", quoted(d.precision));
+  out.add("error", error_json(row.error), "cpu_s_per_s", row.cpu_per_s > 0 ? number(row.cpu_per_s) : "null");
+  out.add("unstable", o.state == Outcome::unstable, "label", quoted(row.job.label));
+  out.add("state", quoted(word_of(o.state)), "why", quoted(o.sentence));
+  out.add("axes", json_words(row.candidate.axes), "headline", row.headline, "timed_alone", row.alone);
+  out.add("steps", o.steps, "took_s", o.took);
   const double predicted = o.predicted(subject.duration);
   out.add("predicted_s", o.state == Outcome::cut && std::isfinite(predicted) ? number(predicted) : "null");
   JsonObject set;
   for (const auto &[pointer, value] : settings_of_file(subject, row)) set.add(pointer, value);
-  out.add("set", set.text()).add("folder", quoted(row.job.folder));
+  out.add("set", set.text(), "folder", quoted(row.job.folder));
   return out.text();
 }
 
@@ -71,23 +59,19 @@ const char *word_of(Basis basis) {
 std::string limits_json(const Study &study) {
   JsonObject out;
   for (const auto &[name, limit] : study.limits) {
-    JsonObject one;
-    one.add("order", number(limit.order)).add("used", limit.used ? "true" : "false");
-    one.add("basis", quoted(word_of(limit.basis))).add("bound", number(limit.bound));
-    out.add(name, one.text());
+    out.add(name, json_object("order", limit.order, "used", limit.used, "basis", quoted(word_of(limit.basis)),
+                              "bound", limit.bound));
   }
   return out.text();
 }
 
 std::string reference_json(const Study &study) {
-  JsonObject out;
-  out.add("choice", std::to_string(study.reference)).add("converged", study.converged ? "true" : "false");
-  out.add("error", number(study.reference_headline)).add("bound", number(study.reference_bound));
-  out.add("errors", error_json(study.reference_error));
-  out.add("check", study.check >= 0 ? std::to_string(study.check) : "null");
-  out.add("third", study.third >= 0 ? std::to_string(study.third) : "null").add("limits", limits_json(study));
-  out.add("best_error_shown", number(study.best)).add("why", quoted(study.axes.reference_why));
-  return out.text();
+  return json_object("choice", study.reference, "converged", study.converged, "error",
+                     study.reference_headline, "bound", study.reference_bound, "errors",
+                     error_json(study.reference_error), "check",
+                     study.check >= 0 ? std::to_string(study.check) : "null", "third",
+                     study.third >= 0 ? std::to_string(study.third) : "null", "limits", limits_json(study),
+                     "best_error_shown", study.best, "why", quoted(study.axes.reference_why));
 }
 
 std::string own_mesh_json(const Study &study) {
@@ -96,11 +80,8 @@ std::string own_mesh_json(const Study &study) {
   std::vector<std::string> front;
   for (const size_t i : own.front)
     front.push_back("{\"choice\": " + std::to_string(i) + ", \"error\": " + number(own.error.at(i)) + "}");
-  JsonObject out;
-  out.add("choice", std::to_string(own.reference)).add("check", std::to_string(own.check));
-  out.add("error", number(own.own)).add("mesh_error", number(own.mesh)).add("front", json_array(front));
-  out.add("pick", own.pick < 0 ? "null" : std::to_string(own.pick));
-  return out.text();
+  return json_object("choice", own.reference, "check", own.check, "error", own.own, "mesh_error", own.mesh,
+                     "front", json_array(front), "pick", own.pick < 0 ? "null" : std::to_string(own.pick));
 }
 
 std::string separated_json(const Study &study) {
@@ -109,10 +90,8 @@ std::string separated_json(const Study &study) {
     std::vector<std::string> rows;
     for (const auto &[i, e] : part.rows)
       rows.push_back("{\"choice\": " + std::to_string(i) + ", \"error\": " + number(e) + "}");
-    JsonObject out;
-    out.add("axis", quoted(part.axis)).add("kind", quoted(part.kind));
-    out.add("anchor", std::to_string(part.anchor)).add("rows", json_array(rows));
-    parts.push_back(out.text());
+    parts.push_back(json_object("axis", quoted(part.axis), "kind", quoted(part.kind), "anchor", part.anchor,
+                                "rows", json_array(rows)));
   }
   return json_array(parts);
 }
@@ -134,10 +113,8 @@ void list_axes(const Study &study, std::string &out) {
            study.rows[part.anchor].job.label + "\n";
     for (const auto &[i, e] : part.rows) {
       if (i == part.anchor) continue;
-      char line[200];
-      std::snprintf(line, sizeof line, "    %8s  %9.3g  %s\n", percent(e).c_str(), study.rows[i].cpu_per_s,
-                    study.rows[i].job.label.c_str());
-      out += line;
+      out += formatted("    %8s  %9.3g  %s\n", percent(e).c_str(), study.rows[i].cpu_per_s,
+                       study.rows[i].job.label.c_str());
     }
   }
   for (const Axis &axis : study.axes.axes)
@@ -435,24 +412,22 @@ std::string json_report(const Subject &subject, const Study &study, const JsonVa
   for (const auto &[name, scale] : study.scales)
     scales.add(name, "{\"scale\": " + number(scale) + ", \"unit\": " + quoted(study.units.at(name)) + "}");
   JsonObject out;
-  out.add("format", quoted("deform-cost")).add("version", "1").add("scene", quoted(subject.path));
-  out.add("quantities", json_words(study.quantities)).add("headline", json_words(study.headline));
-  out.add("says", json_words({error_text(subject, study), reference_text(study), pick_text(subject, study)}));
-  out.add("scales", scales.text()).add("reference", reference_json(study));
-  out.add("choices", json_array(choices)).add("front", json_array(front));
+  out.add("format", quoted("deform-cost"), "version", "1", "scene", quoted(subject.path), "quantities",
+          json_words(study.quantities), "headline", json_words(study.headline), "says",
+          json_words({error_text(subject, study), reference_text(study), pick_text(subject, study)}),
+          "scales", scales.text(), "reference", reference_json(study), "choices", json_array(choices),
+          "front", json_array(front));
   if (study.pick < 0) {
     out.add("pick", "null");
   } else {
     JsonObject pick;
-    pick.add("index", std::to_string(study.pick)).add("scene_patch", json_text(patch));
-    pick.add("target", number(study.options.target)).add("proven", study.proven ? "true" : "false");
-    pick.add("this_mesh", study.mesh_stays ? "true" : "false");
+    pick.add("index", study.pick, "scene_patch", json_text(patch), "target", study.options.target, "proven",
+             study.proven, "this_mesh", study.mesh_stays);
     out.add("pick", pick.text());
   }
-  out.add("this_mesh", own_mesh_json(study));
-  out.add("separated", separated_json(study)).add("left_out", json_array(left_out));
-  out.add("budget_s", number(study.options.budget)).add("used_s", number(study.used));
-  out.add("runs_started", std::to_string(study.started));
+  out.add("this_mesh", own_mesh_json(study), "separated", separated_json(study), "left_out",
+          json_array(left_out), "budget_s", study.options.budget, "used_s", study.used, "runs_started",
+          study.started);
   JsonValue whole;
   parse_json(out.text(), whole);
   return as_utf8(json_lines(whole));

@@ -133,10 +133,10 @@ double Runs::left() const {
 }
 
 void Runs::keep_spent() const {
-  JsonObject spent;
-  spent.add("fingerprint", quoted(std::to_string(subject_.fingerprint)));
-  spent.add("seconds", number(budget_ - left()));
-  write_whole(out_ + "/runs/spent.json", spent.text() + "\n");
+  write_whole(
+      out_ + "/runs/spent.json",
+      json_object("fingerprint", quoted(std::to_string(subject_.fingerprint)), "seconds", budget_ - left()) +
+          "\n");
 }
 
 void Runs::prepare(Job &job, const std::string &kind) const {
@@ -161,17 +161,15 @@ void Runs::prepare(Job &job, const std::string &kind) const {
 
 void Runs::store(const Job &job) const {
   const Outcome &o = job.outcome;
-  JsonObject out;
-  out.add("label", quoted(job.label)).add("state", std::to_string(int(o.state)));
-  out.add("sentence", quoted(o.sentence)).add("cpu_s", number(o.cpu)).add("simulated_s", number(o.simulated));
-  out.add("took_s", number(o.took)).add("limit_s", number(o.limit)).add("steps", number(o.steps));
-  out.add("cells", number(o.cells)).add("made_s", number(o.made));
-  write_whole(job.folder + "/outcome.json", out.text() + "\n");
+  write_whole(job.folder + "/outcome.json",
+              json_object("label", quoted(job.label), "state", int(o.state), "sentence", quoted(o.sentence),
+                          "cpu_s", o.cpu, "simulated_s", o.simulated, "took_s", o.took, "limit_s", o.limit,
+                          "steps", o.steps, "cells", o.cells, "made_s", o.made) +
+                  "\n");
 }
 
 void Runs::start(Job &job, Child &out) {
-  const auto waiting =
-      std::find_if(paused_.begin(), paused_.end(), [&](const Child &c) { return c.job == &job; });
+  const auto waiting = std::ranges::find_if(paused_, [&](const Child &c) { return c.job == &job; });
   if (waiting != paused_.end()) {
     out = *waiting;
     paused_.erase(waiting);
@@ -300,7 +298,7 @@ bool Runs::waits(Job &job) const {
   if (job.limit < kMin || job.outcome.final_state()) return true;
   if (job.outcome.state != Outcome::cut) return false;
   const auto same = [&](const Child &c) { return c.job == &job; };
-  const bool goes_on = std::any_of(paused_.begin(), paused_.end(), same);
+  const bool goes_on = std::ranges::any_of(paused_, same);
   const double need = job.outcome.predicted(subject_.duration) - (goes_on ? job.outcome.took : 0);
   const bool slice = job.work < std::numeric_limits<double>::max();  // need not come to its end
   // how far a search for an equilibrium has come is unknown: it is tried

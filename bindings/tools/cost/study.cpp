@@ -76,7 +76,7 @@ class Student {
       if (out_.rows[i].candidate.knobs == candidate.knobs) {
         auto &axes = out_.rows[i].candidate.axes;
         for (const std::string &axis : candidate.axes)
-          if (std::find(axes.begin(), axes.end(), axis) == axes.end()) axes.push_back(axis);
+          if (std::ranges::find(axes, axis) == axes.end()) axes.push_back(axis);
         return int(i);
       }
     Row row;
@@ -104,9 +104,8 @@ class Student {
         JsonObject probe;
         const std::string end = "_end" + std::to_string(k + 1), name = body.name + end;
         // a name of the length that a name may have leaves no room
-        probe.add("name", quoted(name.size() > 100 ? std::to_string(&body - s_.bodies.data()) + end : name))
-            .add("body", quoted(body.name));
-        probe.add("point", json_vector(body.ends[k].data()));
+        probe.add("name", quoted(name.size() > 100 ? std::to_string(&body - s_.bodies.data()) + end : name),
+                  "body", quoted(body.name), "point", json_vector(body.ends[k].data()));
         probes.push_back(probe.text());
       }
     out.emplace_back("/probes", json_array(probes));
@@ -217,8 +216,8 @@ class Student {
   int turn(int row) const { return on_ladder(row) ? 0 : same_physics(row) ? 1 : 2; }
 
   bool on_ladder(int row) const {
-    return std::any_of(ladder_.begin(), ladder_.end(),
-                       [&](const auto &pair) { return pair.first == row || pair.second == row; });
+    return std::ranges::any_of(ladder_,
+                               [&](const auto &pair) { return pair.first == row || pair.second == row; });
   }
 
   bool failed(int row) const {
@@ -236,7 +235,7 @@ class Student {
   // It is the reference only where explicit time is impossible, which no larger budget changes.
   bool hides_impacts(int row) const {
     if (!damps_impacts(row)) return false;
-    return std::any_of(ladder_.begin(), ladder_.end(), [&](const auto &pair) {
+    return std::ranges::any_of(ladder_, [&](const auto &pair) {
       const Outcome &o = out_.rows[size_t(pair.first)].job.outcome;
       return !damps_impacts(pair.first) && o.state != Outcome::refused && o.state != Outcome::unstable;
     });
@@ -263,7 +262,7 @@ class Student {
       if (int(i) != out_.reference && int(i) != out_.check && int(i) != out_.third &&
           (!on_ladder(int(i)) || i == 0 || out_.rows[i].candidate.axes.size() > 1))
         order.push_back(int(i));
-    std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
+    std::ranges::stable_sort(order, [&](int a, int b) {
       const int first = turn(a) / 2, second = turn(b) / 2;  // the ladder counts as the rest here
       return first != second ? first < second : wait_for(a) < wait_for(b);
     });
@@ -326,8 +325,8 @@ class Student {
       out_.reference = int(i);
     }
     if (out_.reference >= 0) return;
-    const bool any = std::any_of(out_.rows.begin(), out_.rows.end(),
-                                 [](const Row &row) { return row.job.outcome.state == Outcome::done; });
+    const bool any =
+        std::ranges::any_of(out_.rows, [](const Row &row) { return row.job.outcome.state == Outcome::done; });
     for (const Row &row : out_.rows)
       if (!any && (row.job.outcome.state == Outcome::unstable || row.job.outcome.state == Outcome::refused))
         throw Failure(kBadInput, s_.path + ": no run came to its end; \"" + row.job.label +
@@ -337,12 +336,12 @@ class Student {
       const double own = predicted(0);
       least = std::isfinite(own) ? own / kOwnShare : 10 * out_.options.budget;
     }
-    char text[200];
-    std::snprintf(text, sizeof text,
-                  ": no run%s came to its end within the budget of %.3g s; take --budget %.0f or more",
-                  any ? " that can be the reference (explicit time, in which contacts rebound)" : "",
-                  out_.options.budget, std::ceil(least));
-    throw Failure(kBadInput, s_.path + text);
+    throw Failure(
+        kBadInput,
+        s_.path +
+            formatted(": no run%s came to its end within the budget of %.3g s; take --budget %.0f or more",
+                      any ? " that can be the reference (explicit time, in which contacts rebound)" : "",
+                      out_.options.budget, std::ceil(least)));
   }
 
   void compare() {
@@ -502,7 +501,7 @@ class Student {
     for (size_t i = 0; i < out_.rows.size(); ++i) {
       const Row &row = out_.rows[i];
       const auto &axes = row.candidate.axes;
-      const bool member = i == 0 || std::find(axes.begin(), axes.end(), axis) != axes.end();
+      const bool member = i == 0 || std::ranges::find(axes, axis) != axes.end();
       if (!member || !row.compared) continue;
       const Knobs &k = row.candidate.knobs;
       double rank = i == 0 ? 0 : -1;
@@ -525,7 +524,7 @@ class Student {
       if (!out_.rows[part.anchor].compared) continue;
       for (size_t i = 0; i < out_.rows.size(); ++i) {
         const auto &axes = out_.rows[i].candidate.axes;
-        const bool member = i == 0 || std::find(axes.begin(), axes.end(), axis.name) != axes.end();
+        const bool member = i == 0 || std::ranges::find(axes, axis.name) != axes.end();
         if (member && out_.rows[i].compared)
           part.rows.emplace_back(i, largest(errors(i, figures_[part.anchor])));
       }
@@ -546,8 +545,8 @@ class Student {
 
   template <class Error>
   std::vector<size_t> front_of(std::vector<size_t> order, Error error) const {
-    std::stable_sort(order.begin(), order.end(),
-                     [&](size_t a, size_t b) { return out_.rows[a].cpu_per_s < out_.rows[b].cpu_per_s; });
+    std::ranges::stable_sort(
+        order, [&](size_t a, size_t b) { return out_.rows[a].cpu_per_s < out_.rows[b].cpu_per_s; });
     std::vector<size_t> out;
     double least = std::numeric_limits<double>::infinity();
     for (const size_t i : order)

@@ -15,6 +15,7 @@
 #include "file.h"
 #include "messages.h"
 #include "scene_file.h"
+#include "state_file.h"
 
 namespace fs = std::filesystem;
 
@@ -200,11 +201,7 @@ Hash &Hash::add_file(const std::string &path) {
   return *this;
 }
 
-std::string Hash::hex() const {
-  char text[20];
-  std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(h_));
-  return text;
-}
+std::string Hash::hex() const { return hash_text(h_); }
 
 const JsonValue *at_pointer(const JsonValue &value, const std::string &pointer) {
   const JsonValue *at = &value;
@@ -235,8 +232,7 @@ void set_pointer(JsonValue &value, const std::string &pointer, const JsonValue &
       continue;
     }
     at->kind = JsonValue::object;
-    const auto found = std::find_if(at->members.begin(), at->members.end(),
-                                    [&](const JsonMember &m) { return m.name == key; });
+    const auto found = std::ranges::find_if(at->members, [&](const JsonMember &m) { return m.name == key; });
     if (found == at->members.end()) {
       at->members.push_back({key, {}});
       at = &at->members.back().value;

@@ -203,7 +203,7 @@ class CaseReader {
   void warn_of_keys_in(const JsonValue &of, const std::string &pointer, const std::vector<std::string> &known,
                        const std::string &where) const {
     for (const JsonMember &m : of.members) {
-      if (std::find(known.begin(), known.end(), m.name) != known.end()) continue;
+      if (std::ranges::find(known, m.name) != known.end()) continue;
       warn(file_ + ": " + pointer + m.name + " is not read" + where +
            (m.name == "F0" || m.name.find("normal") != std::string::npos
                 ? "; the normal force is /normal_force"
@@ -221,7 +221,7 @@ class CaseReader {
     if (c.kind == "table")
       refuse("/input/kind",
              "is \"table\": values to compare functions with, not a run; there is nothing to simulate");
-    const auto found = std::find(kinds.begin(), kinds.end(), c.kind);
+    const auto found = std::ranges::find(kinds, c.kind);
     if (found == kinds.end()) {
       std::string all;
       for (const std::string &k : kinds) all += (all.empty() ? "" : ", ") + k;

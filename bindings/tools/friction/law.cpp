@@ -65,7 +65,7 @@ class Filler {
 
  private:
   bool given(const std::string &key) const {
-    return std::any_of(filled_.begin(), filled_.end(), [&](const auto &f) { return f.first == key; });
+    return std::ranges::any_of(filled_, [&](const auto &f) { return f.first == key; });
   }
   void put(const std::string &key, std::vector<double> value) { filled_.emplace_back(key, std::move(value)); }
 
@@ -74,7 +74,7 @@ class Filler {
     if (p.word.empty()) return put(row.key, p.value);
     std::vector<std::string> names;
     for (const char *const *n = row.names; n && *n; ++n) names.push_back(*n);
-    const auto found = std::find(names.begin(), names.end(), p.word);
+    const auto found = std::ranges::find(names, p.word);
     if (found == names.end()) {
       std::string all;
       for (const std::string &n : names) all += (all.empty() ? "" : ", ") + n;
@@ -174,8 +174,8 @@ void RigLaw::warn_of(const FrictionCase &rig, const std::vector<std::string> &us
   for (const dfm_param &row : params_of(*type_)) names.push_back(row.key);
   std::string lacks;
   for (const CaseParam &p : rig.params) {
-    if (std::find(used.begin(), used.end(), p.key) != used.end()) continue;
-    const bool known = std::find(kCaseKeys.begin(), kCaseKeys.end(), p.key) != kCaseKeys.end();
+    if (std::ranges::find(used, p.key) != used.end()) continue;
+    const bool known = std::ranges::find(kCaseKeys, p.key) != kCaseKeys.end();
     if (known && shipped(*type_)) continue;
     lacks += (lacks.empty() ? "" : ", ") + p.key;
     const std::string near = known ? "" : nearest(p.key, names);

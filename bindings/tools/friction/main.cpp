@@ -45,16 +45,10 @@ void print(const FrictionOptions &options, const Globals &globals, const Frictio
            const RigResult &result) {
   if (globals.json) {
     JsonObject out;
-    out.add("file", quoted(options.file))
-        .add("case", quoted(rig.id))
-        .add("kind", quoted(rig.kind))
-        .add("law", quoted(law.type().id));
-    out.add("normal_force", number(law.normal_force()))
-        .add("step", number(options.step))
-        .add("steps", std::to_string(result.steps));
-    out.add("evaluations", std::to_string(law.evaluations()))
-        .add("rows", std::to_string(result.rows.size()))
-        .add("jumps", std::to_string(result.jumps));
+    out.add("file", quoted(options.file), "case", quoted(rig.id), "kind", quoted(rig.kind), "law",
+            quoted(law.type().id), "normal_force", law.normal_force(), "step", options.step, "steps",
+            result.steps, "evaluations", law.evaluations(), "rows", result.rows.size(), "jumps",
+            result.jumps);
     for (const auto &[name, values] : result.figures) {
       const bool list = values.size() != 1 || name.find("times") != std::string::npos ||
                         name.find("per_") != std::string::npos;

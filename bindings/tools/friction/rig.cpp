@@ -48,11 +48,7 @@ class Rig {
   }
 
  private:
-  static std::string short_text(double x) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%.6g", x);
-    return text;
-  }
+  static std::string short_text(double x) { return formatted("%.6g", x); }
   double in(const char *key) const { return case_.input.at(key); }
   bool pushed() const {
     return case_.drive == Drive::force || case_.drive == Drive::spring || case_.drive == Drive::ramps;
@@ -235,7 +231,7 @@ class Rig {
   }
   void require(const std::vector<std::string> &known) const {
     for (const std::string &name : case_.columns)
-      if (std::find(known.begin(), known.end(), name) == known.end()) {
+      if (std::ranges::find(known, name) == known.end()) {
         std::string all;
         for (const std::string &k : known) all += (all.empty() ? "" : " ") + k;
         throw Failure(kBadInput, case_.file + ": /columns names \"" + name + "\", expected some of " + all +
@@ -382,7 +378,7 @@ class Rig {
       throw Failure(
           kBadInput,
           case_.file + ": /params/v_s is missing, expected the speed in m/s whose 30-fold ends a ramp");
-    const double slowest = *std::min_element(case_.times.begin(), case_.times.end());
+    const double slowest = std::ranges::min(case_.times);
     for (const double rate : case_.times) {
       rate_ = rate;
       // the force grows by the same amount in every step of every ramp

@@ -94,7 +94,7 @@ std::vector<std::array<uint32_t, 2>> outer_faces(const std::vector<Tet> &cells) 
   std::map<std::array<uint32_t, 3>, uint32_t> count;
   const auto face = [&](uint32_t c, uint32_t f) {
     std::array<uint32_t, 3> v = {cells[c][kFace[f][0]], cells[c][kFace[f][1]], cells[c][kFace[f][2]]};
-    std::sort(v.begin(), v.end());
+    std::ranges::sort(v);
     return v;
   };
   for (uint32_t c = 0; c < cells.size(); ++c)

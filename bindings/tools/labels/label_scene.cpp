@@ -18,6 +18,7 @@
 namespace labels {
 namespace {
 
+using cli::json_object;
 using cli::JsonObject;
 using cli::JsonValue;
 using cli::number;
@@ -248,7 +249,7 @@ class Maker {
           for (size_t i = 0; i < 3; ++i) on[surface.triangles[3 * t + i]] = true;
           area += triangle_area(surface, t);
         }
-      border.points = uint32_t(std::count(on.begin(), on.end(), true));
+      border.points = uint32_t(std::ranges::count(on, true));
       if (border.triangles == 0) {
         warn("the body " + a.name + " meets " + b.name + " on less than a face of its cells, and is not " +
              (border.held ? "held" : "attached") + " there; give it more cells");
@@ -518,7 +519,7 @@ class Maker {
     JsonObject out, surface;
     if (t.own_boundary) surface.add("from", "\"boundary\"");
     else surface.add("mesh", quoted(t.name + ".obj"));
-    out.add("name", quoted(t.name)).add("mesh", quoted(t.name + ".vtk")).add("surface", surface.text());
+    out.add("name", quoted(t.name), "mesh", quoted(t.name + ".vtk"), "surface", surface.text());
     if (t.entries.size() == 1) out.add("material", quoted(table_.entries[t.entries[0]].material));
     else {
       JsonObject materials;
@@ -533,14 +534,10 @@ class Maker {
       if (b.a != t.name) continue;
       const std::string group = quoted("to_" + b.b);
       if (b.triangles == 0) continue;
-      if (b.held) fix.push_back(JsonObject().add("group", group).text());
+      if (b.held) fix.push_back(json_object("group", group));
       else
-        attach.push_back(JsonObject()
-                             .add("to", quoted(b.b))
-                             .add("group", group)
-                             .add("stiffness", rounded(b.stiffness))
-                             .add("damping", rounded(b.damping))
-                             .text());
+        attach.push_back(json_object("to", quoted(b.b), "group", group, "stiffness", rounded(b.stiffness),
+                                     "damping", rounded(b.damping)));
     }
     add_list(out, "attach", attach, t.more);
     add_list(out, "fix", fix, t.more);
@@ -556,10 +553,8 @@ class Maker {
     if (!ours.empty()) out.add(key, cli::json_array(ours));
   }
   static std::string rounded(double x) {
-    char text[40];
-    std::snprintf(text, sizeof text, "%.3g", x);
     double value = 0;
-    to_number(text, value);
+    to_number(cli::formatted("%.3g", x), value);
     return number(value);
   }
 
@@ -591,8 +586,7 @@ class Maker {
     JsonObject out;
     std::vector<std::string> filter;
     for (const Border &b : report_.borders)
-      if (b.held)
-        filter.push_back(JsonObject().add("between", cli::json_array({quoted(b.a), quoted(b.b)})).text());
+      if (b.held) filter.push_back(json_object("between", cli::json_array({quoted(b.a), quoted(b.b)})));
     const JsonValue none, *own = table_.scene.find("contact");
     if (!own) own = &none;
     add_list(out, "filter", filter, *own);
@@ -610,11 +604,8 @@ class Maker {
       if (!t.obstacle) bodies.push_back(body_json(t));
       held = held || t.obstacle || t.more.find("fix") || t.more.find("attach");
       if (t.obstacle)
-        obstacles.push_back(JsonObject()
-                                .add("name", quoted(t.name))
-                                .add("shape", "\"voxels\"")
-                                .add("mesh", quoted(t.name + ".obj"))
-                                .text());
+        obstacles.push_back(
+            json_object("name", quoted(t.name), "shape", "\"voxels\"", "mesh", quoted(t.name + ".obj")));
     }
     // A scan shows bodies under their weight already; what nothing holds falls onto a floor.
     rest["gravity"] = held ? "[0, 0, 0]" : "[0, 0, -9.81]";
@@ -625,18 +616,15 @@ class Maker {
       const double point[3] = {0, 0, lowest_};
       std::string name = "floor";
       while (std::ranges::find(table_.things, name, &Thing::name) != table_.things.end()) name += '_';
-      obstacles.push_back(JsonObject()
-                              .add("name", cli::quoted(name))
-                              .add("shape", "\"plane\"")
-                              .add("point", cli::json_vector(point))
-                              .text());
+      obstacles.push_back(
+          json_object("name", cli::quoted(name), "shape", "\"plane\"", "point", cli::json_vector(point)));
     }
     for (const cli::JsonMember &m : table_.scene.members)
       if (m.name != "obstacles" && m.name != "contact") rest[m.name] = cli::json_text(m.value);
     if (const std::string contact = contact_json(); contact != "{}") rest["contact"] = contact;
     JsonObject out;
-    out.add("format", "\"deform-scene\"").add("version", "1");
-    out.add("materials", cli::json_text(table_.materials)).add("bodies", cli::json_array(bodies));
+    out.add("format", "\"deform-scene\"", "version", "1", "materials", cli::json_text(table_.materials),
+            "bodies", cli::json_array(bodies));
     if (!obstacles.empty()) out.add("obstacles", cli::json_array(obstacles));
     for (const auto &[key, value] : rest) out.add(key, value);
     JsonValue whole;
@@ -665,9 +653,9 @@ class Maker {
       eye[k] = rounded(look[k] + way[k] * size);
       look[k] = rounded(look[k]);
     }
-    JsonObject camera;
-    camera.add("eye", cli::json_vector(eye)).add("look_at", cli::json_vector(look));
-    return JsonObject().add("every", "0.05").add("camera", camera.text()).add("color", "\"body\"").text();
+    return json_object("every", "0.05", "camera",
+                       json_object("eye", cli::json_vector(eye), "look_at", cli::json_vector(look)), "color",
+                       "\"body\"");
   }
 
   dfm_context *const context_;

@@ -116,7 +116,7 @@ class Net {
                 front, own);
         }
       below.swap(above);
-      std::fill(above.begin(), above.end(), UINT32_MAX);
+      std::ranges::fill(above, UINT32_MAX);
     }
   }
   void add(const std::array<uint32_t, 4> &c, uint16_t behind, uint16_t front) {
@@ -136,8 +136,7 @@ class Net {
         const uint32_t a = q.corner[c], b = q.corner[(c + 1) & 3];
         sides.push_back({std::min(a, b), std::max(a, b), {q.behind, q.front}});
       }
-    std::sort(sides.begin(), sides.end(),
-              [](const Side &s, const Side &t) { return s.a != t.a ? s.a < t.a : s.b < t.b; });
+    std::ranges::sort(sides, [](const Side &s, const Side &t) { return s.a != t.a ? s.a < t.a : s.b < t.b; });
     struct Edge {
       uint32_t a, b;
       bool line;  // three labels or more
@@ -261,7 +260,7 @@ class Net {
         }
       }
     }
-    std::stable_sort(pulls.begin(), pulls.end(), [](const Pull &a, const Pull &b) {
+    std::ranges::stable_sort(pulls, [](const Pull &a, const Pull &b) {
       return a.vertex != b.vertex ? a.vertex < b.vertex : a.label < b.label;
     });
     size_t n = 0;
@@ -364,7 +363,7 @@ class Net {
     };
     for (uint32_t q = 0; q < quads_.size(); ++q)
       entries.push_back({key(corner(q, 0), corner(q, 1), corner(q, 2)), q});
-    std::sort(entries.begin(), entries.end(), [](const Entry &a, const Entry &b) {
+    std::ranges::sort(entries, [](const Entry &a, const Entry &b) {
       return a.key != b.key ? a.key < b.key : a.quad < b.quad;
     });
     std::vector<uint8_t> found(quads_.size(), 0);
@@ -390,8 +389,7 @@ class Net {
       for (int64_t k = -2; k <= 2; ++k)
         for (int64_t j = -2; j <= 2; ++j) {
           const int64_t i = corner(q, 0), y = corner(q, 1) + j, z = corner(q, 2) + k;
-          auto e = std::lower_bound(entries.begin(), entries.end(), key(i - 2, y, z),
-                                    [](const Entry &a, uint64_t wanted) { return a.key < wanted; });
+          auto e = std::ranges::lower_bound(entries, key(i - 2, y, z), {}, &Entry::key);
           for (; e != entries.end() && e->key <= key(i + 2, y, z); ++e)
             if (e->quad > q) test(q, e->quad);
         }
@@ -484,7 +482,7 @@ Shell shell_of(const Surfaces &s, const std::vector<bool> &inside) {
       const uint32_t a = out.triangles[3 * t + i], b = out.triangles[3 * t + (i + 1) % 3];
       edges.push_back({std::min(a, b), std::max(a, b), a < b});
     }
-  std::sort(edges.begin(), edges.end());
+  std::ranges::sort(edges);
   for (size_t i = 0, n; i < edges.size(); i += n) {
     for (n = 1; i + n < edges.size() && edges[i + n][0] == edges[i][0] && edges[i + n][1] == edges[i][1];
          ++n) {}

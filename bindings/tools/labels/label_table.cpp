@@ -94,7 +94,7 @@ class Reader {
   }
   void known(const JsonValue &v, const std::string &pointer, const std::vector<std::string> &keys) const {
     for (const JsonMember &m : v.members) {
-      if (std::find(keys.begin(), keys.end(), m.name) != keys.end()) continue;
+      if (std::ranges::find(keys, m.name) != keys.end()) continue;
       refuse(path_, "%s/%s: no such key%s", pointer.c_str(), escaped(m.name).c_str(),
              cli::did_you_mean(m.name, keys).c_str());
     }
@@ -326,12 +326,12 @@ std::string table_text(const Table &table, const Volume &volume) {
     if (t.obstacle || (t.cells == 0 && !t.own_boundary && t.more.members.empty())) continue;
     cli::JsonObject body;
     if (t.own_boundary) body.add("surface", "{\"from\": \"boundary\"}");
-    if (t.cells) body.add("cells", std::to_string(t.cells));
+    if (t.cells) body.add("cells", t.cells);
     for (const JsonMember &m : t.more.members) body.add(m.name, cli::json_text(m.value));
     bodies.add(t.name, body.text());
   }
-  out.add("format", "\"deform-labels\"").add("version", "1").add("labels", labels.text());
-  out.add("materials", cli::json_text(table.materials));
+  out.add("format", "\"deform-labels\"", "version", "1", "labels", labels.text(), "materials",
+          cli::json_text(table.materials));
   if (bodies.text() != "{}") out.add("bodies", bodies.text());
   if (table.scene.kind == JsonValue::object) out.add("scene", cli::json_text(table.scene));
   JsonValue whole;

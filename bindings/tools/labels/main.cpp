@@ -18,68 +18,34 @@ namespace {
 // Per cell; from here on contact of the surface, not the cells, decides what a step costs.
 constexpr uint32_t kManyTriangles = 2;
 
-std::string whole(uint64_t n) { return std::to_string(n); }
-
 std::string size_json(const std::array<uint32_t, 3> &n) {
-  return json_array({whole(n[0]), whole(n[1]), whole(n[2])});
+  return json_array({json_of(n[0]), json_of(n[1]), json_of(n[2])});
 }
 
 std::string report_json(const labels::Report &r, const std::string &out) {
   std::vector<std::string> names, things, borders;
   for (const labels::LabelReport &l : r.labels)
-    names.push_back(JsonObject()
-                        .add("label", std::to_string(l.value))
-                        .add("name", quoted(l.name))
-                        .add(l.obstacle ? "obstacle" : "body", quoted(l.thing))
-                        .add("voxels", whole(l.voxels))
-                        .add("changed", whole(l.changed))
-                        .add("voxel_volume", number(l.voxel_volume))
-                        .add("volume", number(l.volume))
-                        .add("triangles", whole(l.triangles))
-                        .add("cells", whole(l.cells))
-                        .add("cell_volume", number(l.cell_volume))
-                        .add("at_border", l.at_border ? "true" : "false")
-                        .text());
+    names.push_back(json_object("label", l.value, "name", quoted(l.name), l.obstacle ? "obstacle" : "body",
+                                quoted(l.thing), "voxels", l.voxels, "changed", l.changed, "voxel_volume",
+                                l.voxel_volume, "volume", l.volume, "triangles", l.triangles, "cells",
+                                l.cells, "cell_volume", l.cell_volume, "at_border", l.at_border));
   for (const labels::ThingReport &t : r.things)
-    things.push_back(JsonObject()
-                         .add("name", quoted(t.name))
-                         .add("kind", t.obstacle ? "\"obstacle\"" : "\"body\"")
-                         .add("points", whole(t.points))
-                         .add("triangles", whole(t.triangles))
-                         .add("cells", whole(t.cells))
-                         .add("quality_min", number(t.quality_min))
-                         .add("quality_mean", number(t.quality_mean))
-                         .add("farthest", number(t.farthest))
-                         .text());
+    things.push_back(json_object("name", quoted(t.name), "kind", t.obstacle ? "\"obstacle\"" : "\"body\"",
+                                 "points", t.points, "triangles", t.triangles, "cells", t.cells,
+                                 "quality_min", t.quality_min, "quality_mean", t.quality_mean, "farthest",
+                                 t.farthest));
   for (const labels::Border &b : r.borders)
-    borders.push_back(JsonObject()
-                          .add("between", json_array({quoted(b.a), quoted(b.b)}))
-                          .add("points", whole(b.points))
-                          .add("triangles", whole(b.triangles))
-                          .add("kind", b.held ? "\"held\"" : "\"attached\"")
-                          .add("stiffness", number(b.stiffness))
-                          .text());
-  return JsonObject()
-      .add("scene_hash", quoted(r.scene_hash))
-      .add("scene", quoted(out + "/scene.json"))
-      .add("voxels", size_json(r.size))
-      .add("joined", size_json(r.factor))
-      .add("labels", json_array(names))
-      .add("parts", json_array(things))
-      .add("borders", json_array(borders))
-      .add("open_edges", whole(r.open_edges))
-      .add("crossing_pairs", whole(r.crossing))
-      .add("vertices_put_back", whole(r.restored))
-      .add("largest_volume_change", number(r.largest_change))
-      .add("warnings", json_words(r.warnings))
-      .text();
+    borders.push_back(json_object("between", json_array({quoted(b.a), quoted(b.b)}), "points", b.points,
+                                  "triangles", b.triangles, "kind", b.held ? "\"held\"" : "\"attached\"",
+                                  "stiffness", b.stiffness));
+  return json_object("scene_hash", quoted(r.scene_hash), "scene", quoted(out + "/scene.json"), "voxels",
+                     size_json(r.size), "joined", size_json(r.factor), "labels", json_array(names), "parts",
+                     json_array(things), "borders", json_array(borders), "open_edges", r.open_edges,
+                     "crossing_pairs", r.crossing, "vertices_put_back", r.restored, "largest_volume_change",
+                     r.largest_change, "warnings", json_words(r.warnings));
 }
 
-std::string three(double x) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%.3f", x);
-  return text;
-}
+std::string three(double x) { return formatted("%.3f", x); }
 
 void print_table(const labels::Report &r, const labels::Options &o) {
   std::printf("%s: %u x %u x %u voxels", shown(o.volume).c_str(), r.size[0], r.size[1], r.size[2]);
@@ -141,13 +107,9 @@ int phantom(const Globals &globals, const std::string &kind, double voxel, const
   if (globals.json) {
     std::vector<std::string> rows;
     for (size_t l = 1; l < v.value.size(); ++l)
-      rows.push_back(JsonObject()
-                         .add("label", std::to_string(v.value[l]))
-                         .add("name", quoted(v.name.at(v.value[l])))
-                         .add("volume", number(made.exact[l]))
-                         .text());
-    std::fputs(indented(JsonObject().add("file", quoted(out)).add("labels", json_array(rows)).text()).c_str(),
-               stdout);
+      rows.push_back(
+          json_object("label", v.value[l], "name", quoted(v.name.at(v.value[l])), "volume", made.exact[l]));
+    std::fputs(indented(json_object("file", quoted(out), "labels", json_array(rows))).c_str(), stdout);
   } else if (!globals.quiet) {
     std::printf("%s: %u x %u x %u voxels of %g mm\n", shown(out).c_str(), v.size[0], v.size[1], v.size[2],
                 voxel);

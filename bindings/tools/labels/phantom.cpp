@@ -106,13 +106,8 @@ Phantom make_phantom(const std::string &kind, double voxel) {
 std::string nrrd_text(const Volume &v) {
   std::string out =
       "NRRD0005\n# made by deform mesh phantom\ntype: uint8\ndimension: 3\nspace dimension: 3\nsizes:";
-  const auto digits = [](double meters) {
-    char text[40];
-    std::snprintf(text, sizeof text, "%.12g", 1e3 * meters);
-    return std::string(text);
-  };
-  const auto vector = [&](const double x[3]) {
-    return "(" + digits(x[0]) + "," + digits(x[1]) + "," + digits(x[2]) + ")";
+  const auto vector = [](const double x[3]) {
+    return cli::formatted("(%.12g,%.12g,%.12g)", 1e3 * x[0], 1e3 * x[1], 1e3 * x[2]);
   };
   for (const uint32_t n : v.size) out += " " + std::to_string(n);
   out += "\nspace directions:";

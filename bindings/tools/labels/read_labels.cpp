@@ -139,7 +139,7 @@ class Collector {
   void sort() {
     std::vector<uint16_t> order(out_.value.size()), place(out_.value.size());
     for (size_t i = 0; i < order.size(); ++i) order[i] = uint16_t(i);
-    std::sort(order.begin(), order.end(), [&](uint16_t a, uint16_t b) {
+    std::ranges::sort(order, [&](uint16_t a, uint16_t b) {
       const int64_t va = out_.value[a], vb = out_.value[b];
       return (va != 0) != (vb != 0) ? va == 0 : va < vb;
     });
