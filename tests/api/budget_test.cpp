@@ -81,35 +81,6 @@ dfm_world sheets_that_hit(const test::Context &c, const char *law, double speed,
 
 }  // namespace
 
-// Where the budget leaves the guard only a part of the motion, what is prescribed loses that part as well. It
-// never makes up for it at a speed that nobody has prescribed.
-TEST(Budget, WhereTheGuardTakesMotion_HoldsBackWhatIsPrescribed) {
-  test::Context context;
-  dfm_body sheets[2];
-  const dfm_world w = sheets_that_hit(context, "lugre", 100, sheets);
-  constexpr double kFrom = 0.06, kSpeed = 10;
-  dfm_obstacle_def d = dfm_obstacle_def_default();
-  d.name = "plate";
-  d.shape = DFM_SHAPE_BOX;
-  std::fill_n(d.half_size, 3, 0.01);
-  const dfm_pose_key keys[] = {{0, {{0, 0, kFrom}, {0, 0, 0, 1}}},
-                               {1, {{0, 0, kFrom - kSpeed}, {0, 0, 0, 1}}}};
-  d.keys = keys;
-  d.nkey = 2;
-  dfm_obstacle plate = 0;
-  test::ok(dfm_obstacle_create(w, &d, &plate));
-  test::ok(dfm_world_set_budget(w, 0, 1));
-  double lost = 0;
-  while (dfm_world_time(w) < 0.002) {
-    test::ok(dfm_world_step(w, 1e-3, nullptr));
-    lost = test::stats(w).guard_lost;
-    dfm_pose at{};
-    test::ok(dfm_obstacle_get_pose(plate, &at));
-    EXPECT_NEAR(at.position[2], kFrom - kSpeed * (dfm_world_time(w) - lost), 1e-9) << dfm_world_time(w);
-  }
-  EXPECT_GT(lost, 0);
-}
-
 // Whatever the budget: the world goes on, by what fits, and reaches the end in more steps.
 TEST(Budget, BelowTheLeastWork_StillAdvances) {
   for (const uint64_t share : {2, 4, 1000000}) {

@@ -299,8 +299,7 @@ typedef struct dfm_world_stats {
   double sleep_energy, sleep_momentum[3];
   /* since creation: solves with hits of the guard as contacts; sub-steps repeated with a shorter length */
   uint64_t guard_solves, guard_cuts;
-  /* s since creation: motion removed because neither was enough; keys of motions are late by it */
-  double guard_lost;
+  double guard_lost; /* s since creation: motion removed because neither was enough */
   /* contact solves repeated for a rigid host (DFM_RIGID_AGAIN), since creation */
   uint64_t rigid_again;
   /* units of the last step, also if it was interrupted; maximum since creation (doc/concepts/budget.md) */

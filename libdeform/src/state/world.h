@@ -212,10 +212,4 @@ struct World : WorldMemory, WorldState, Entities, Rules, Derived {
   const Memory &memory() const { return meters.bodies.memory(); }
 };
 
-// s: the time of keys of motions at the end of the next h. It lags behind the clock by the motion that the
-// guard has removed, so that nothing has to catch up at a speed that nobody has prescribed.
-inline double motion_time(const WorldState &s, const Rules &r, double h) {
-  return r.prescribed.at(s.time + h) - s.stats.guard_lost;
-}
-
 }  // namespace dfm

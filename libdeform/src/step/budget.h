@@ -31,10 +31,8 @@ struct Budget {
   double end = 0;
   double span = 0;         // s, from the start of the step to `end`
   bool cheapened = false;  // the step has left something out
-  // contact may have an answer that the budget has not let the solve find
-  bool cuts_solves() const { return divided && cheapened; }
-  bool ended = false;  // the step ends before its end: the budget is used up
-  bool kept = false;   // `start` holds the state before this step
+  bool ended = false;      // the step ends before its end: the budget is used up
+  bool kept = false;       // `start` holds the state before this step
   std::string start;
   dfm_world_stats stats{};  // before the step
 };

@@ -400,7 +400,15 @@ bool wake_hit(World &w, StepContext &step) {
 bool jammed(const World &w, const StepContext &step) {
   if (!(step.guard.motion < kNoWay && step.h > 0.5 * step.length.planned && step.residual.required > 1))
     return false;
-  return !step.budget.cuts_solves() && has_prescribed_motion(w, step, step);
+  // contact may have an answer that the budget has not let it find
+  if (step.budget.divided && step.budget.cheapened) return false;
+  const auto prescribed = [&](const Obstacle &o) {
+    return !o.rigid || std::ranges::any_of(
+                           w.tools, [&](const auto &t) { return t->set == o.rigid && !t->motion.coupled(); });
+  };
+  return !step.driven.empty() || std::ranges::any_of(w.obstacles, [&](const auto &o) {
+    return step.obstacle_views[o->slot].moves() && prescribed(*o);
+  });
 }
 
 // The fraction of the way that leaves no hit, by checks as far as the budget holds them; else none. safe: the
@@ -422,17 +430,6 @@ void take_safe_part(World &w, StepContext &step, bool lets_slits, double safe) {
 bool cross_at_start(const Views &views, Detection &detection, uint32_t slot_a, uint32_t slot_b,
                     bool obstacle) {
   return !crossing(views, detection, slot_a, slot_b, obstacle).triangles.empty();
-}
-
-bool has_prescribed_motion(const Entities &entities, const Views &views, const FreeMotions &motions) {
-  const auto prescribed = [&](const Obstacle &o) {
-    return !o.rigid || std::ranges::any_of(entities.tools, [&](const auto &t) {
-      return t->set == o.rigid && !t->motion.coupled();
-    });
-  };
-  return !motions.driven.empty() || std::ranges::any_of(entities.obstacles, [&](const auto &o) {
-    return views.obstacle_views[o->slot].moves() && prescribed(*o);
-  });
 }
 
 void follow_pairs(const WorldMemory &memory, const Derived &derived, Views &views, Detection &detection,
@@ -505,7 +502,7 @@ Next stage_guard(World &w, StepContext &step, uint32_t *trouble) {
     set_fraction(w, step, 1);
     take_safe_part(w, step, true, safe);
   }
-  if (jammed(w, step)) return go_on(report_jam(w, w, step, step, step, trouble));
+  if (jammed(w, step)) return go_on(report_jam(w, w, step, step, step, kNone, trouble));
   if (!withstands_impacts(w, step)) return Next::stop;
   return Next::stage;
 }

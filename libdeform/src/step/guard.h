@@ -9,8 +9,6 @@ namespace dfm {
 
 struct Derived;
 struct Detection;
-struct Entities;
-struct FreeMotions;
 struct StepContext;
 struct Views;
 struct World;
@@ -76,9 +74,6 @@ bool cross_at_start(const Views &views, Detection &detection, uint32_t slot_a, u
 // candidates of two sides, then those of bodies with themselves. fresh: lists of the latter have changed.
 void follow_pairs(const WorldMemory &memory, const Derived &derived, Views &views, Detection &detection,
                   bool fresh);
-// Whether held points or obstacles move as prescribed: then contact may have no solution, because free bodies
-// and coupled tools yield.
-bool has_prescribed_motion(const Entities &entities, const Views &views, const FreeMotions &motions);
 // Finds guard.common of body i, beside its end, if it moves so far that the guard needs it.
 void check_motion(const World &w, StepContext &step, uint32_t i);
 // guard_hits.cpp: the earliest hits as contacts of the sub-step, among those that it has.

@@ -11,7 +11,7 @@ namespace dfm {
 Pose Obstacle::end_pose(double h, double left, double rest) const {
   if (rigid) return shape_pose(*this, rigid->next[rigid_body]);
   if (!has_target && !moves()) return pose;
-  const Pose end = has_target ? target : pose_at_time(motion_time(*world, *world, rest));
+  const Pose end = has_target ? target : pose_at_time(world->prescribed.at(world->time + rest));
   if (!has_target && !(h < rest)) return end;
   const double s = h / (has_target ? left : rest);
   return {pose.position + s * (end.position - pose.position),

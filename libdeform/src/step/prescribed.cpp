@@ -54,7 +54,7 @@ void stage_motion(const WorldState &state, Entities &entities, Rules &rules, con
       }
       set(end);
     }
-    each_held_place(*b, motion_time(state, rules, times.rest), [&](uint32_t point, Vec3 to) {
+    each_held_place(*b, prescribed.at(state.time + times.rest), [&](uint32_t point, Vec3 to) {
       const size_t at = size_t(point) * kStride;
       const Vec3 v = (1 / times.rest) * (to - load3(&b->p.x[at]));
       for (int k = 0; k < 3; ++k)

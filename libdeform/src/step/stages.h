@@ -121,9 +121,9 @@ bool stage_rigid_predict(const WorldMemory &memory, const WorldState &state, con
                          const Rules &rules, const Derived &derived, const Awake &awake, SubStepTimes &times,
                          Budget &budget, Views &views, Solution &solution, uint32_t *trouble);
 Next stage_rigid_commit(const WorldMemory &memory, WorldState &state, const Entities &entities,
-                        const Derived &derived, const Awake &awake, const FreeMotions &motions,
-                        const Detection &detection, SubStepTimes &times, Budget &budget, Views &views,
-                        Solution &solution, StepImpulses &impulses, uint32_t *trouble);
+                        const Derived &derived, const Awake &awake, const Detection &detection,
+                        SubStepTimes &times, Budget &budget, Views &views, Solution &solution,
+                        StepImpulses &impulses, uint32_t *trouble);
 // solve.cpp
 void stage_distribute(const Detection &detection, const Solution &solution, SubStepEnd &end);
 // sleep.cpp
@@ -154,9 +154,10 @@ double start_depth(const World &w, const StepContext &step, const ContactPoint &
 // As fail_step(). law: failed at this contact, or kNone; null: a value is not finite.
 bool report_failed_solve(World &w, StepContext &step, const LawInstance *law, uint32_t contact,
                          uint32_t *trouble);
-// As fail_step(): the contact solve has no solution, and nothing can move any further.
+// As fail_step(): the contact solve has no solution, and nothing can move any further. row: names what jams;
+// kNone: the one of a soft body that carries most.
 bool report_jam(const WorldState &state, const Entities &entities, const Detection &detection,
-                const Solution &solution, const Views &views, uint32_t *trouble);
+                const Solution &solution, const Views &views, uint32_t row, uint32_t *trouble);
 void reserve_contacts(World &w, StepContext &step);  // memory for keep_contacts()
 // Reserves memory of lists to which keep_contacts() and keep_rigids() add.
 void reserve_reports(WorldState &state, const Entities &entities, const Derived &derived, const Views &views,

@@ -348,7 +348,7 @@ bool advance(World &w, StepContext &step, double end, double goal, bool last, ui
     if (step.guard.motion < 1) move_obstacles_by(w, step, step.guard.motion);
     else move_obstacles(w, step, whole && last);
     w.time = whole ? end : w.time + step.h;
-    if (!w.prescribed.is_static()) w.stats.guard_lost += (1 - step.guard.motion) * step.h;
+    w.stats.guard_lost += (1 - step.guard.motion) * step.h;
     ++w.stats.substeps;
     ++w.bound.age;
     if (ends_here(w, step) && !(whole && last)) return true;

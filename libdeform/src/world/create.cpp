@@ -316,7 +316,7 @@ std::unique_ptr<Obstacle> make_obstacle(World &w, const dfm_obstacle_def &def, b
     o.mesh = std::make_unique<ObstacleMesh>(w.meters.obstacles.memory(), def.npoint, o.points.data(),
                                             def.ntriangle, o.triangles.data());
   if (def.shape == DFM_SHAPE_VOXELS) make_voxels(o, w.meters.obstacles.memory());
-  o.pose = o.pose_at_time(motion_time(w, w, 0));
+  o.pose = o.pose_at_time(w.time);
   check_motion_speed(w, o);
   check_velocity(o, load3(def.velocity_surface));
   o.def.name = o.name.c_str();

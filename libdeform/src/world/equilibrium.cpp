@@ -448,7 +448,7 @@ class Settling {
     if (alone_) return to.time;
     double part = to.time - w_.time, least = HUGE_VAL;
     for (const One &one : bodies_) least = std::min(least, reach(one));
-    while (part > kShortest && prescribed_way(w_.time - w_.stats.guard_lost + part) > least) part *= 0.5;
+    while (part > kShortest && prescribed_way(w_.time + part) > least) part *= 0.5;
     return std::min(to.time, w_.time + std::max(part, kShortest));
   }
 

@@ -181,8 +181,8 @@ Tool &create_tool(World &w, const dfm_tool_def &def) {
   check_keys(t.keys, t.name.c_str());
   check_keys(t.opening_keys, t.name.c_str());
   for (const dfm_scale_key &k : t.opening_keys) check_opening(k.value, t);
-  if (!t.keys.empty()) store_pose(t.def.pose, pose_at(t.keys, motion_time(w, w, 0)));
-  if (!t.opening_keys.empty()) t.def.opening = scale_at(t.opening_keys, motion_time(w, w, 0));
+  if (!t.keys.empty()) store_pose(t.def.pose, pose_at(t.keys, w.time));
+  if (!t.opening_keys.empty()) t.def.opening = scale_at(t.opening_keys, w.time);
   t.motion.stiffness = def.stiffness;
   t.motion.damping = def.damping;
   t.motion.turn_stiffness = def.turn_stiffness;

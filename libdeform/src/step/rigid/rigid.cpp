@@ -212,9 +212,9 @@ bool query_rigid_ends(const WorldState &state, const Entities &entities, bool &a
 }  // namespace
 
 Next stage_rigid_commit(const WorldMemory &memory, WorldState &state, const Entities &entities,
-                        const Derived &derived, const Awake &awake, const FreeMotions &motions,
-                        const Detection &detection, SubStepTimes &times, Budget &budget, Views &views,
-                        Solution &solution, StepImpulses &impulses, uint32_t *trouble) {
+                        const Derived &derived, const Awake &awake, const Detection &detection,
+                        SubStepTimes &times, Budget &budget, Views &views, Solution &solution,
+                        StepImpulses &impulses, uint32_t *trouble) {
   sum_rigid_impulses(entities, derived, views, detection, solution);
   ToolTouch &tools = *views.tools;
   tools.list(state, solution);
@@ -233,8 +233,9 @@ Next stage_rigid_commit(const WorldMemory &memory, WorldState &state, const Enti
   if (!tools.follows_arcs(entities, derived, awake, times, budget) ||
       !tools.stays_out(memory, state, entities, derived, awake, views, times, budget))
     return Next::stop;
-  if (tools.jams(entities, derived, views, motions, budget))
-    return go_on(report_jam(state, entities, detection, solution, views, trouble));
+  if (const uint32_t row = tools.jammed_row(derived); row != kNone)
+    return go_on(
+        report_jam(state, entities, detection, solution, views, solution.rows.soft() + row, trouble));
   tools.turn_jaws();
   reserve_reports(state, entities, derived, views, solution, impulses);
   // From here on (guard) their true motion is used.

@@ -87,26 +87,33 @@ void ToolTouch::add_rows_to_velocities(const Views &views) {
   }
 }
 
+// The number among the groups of all sides; kNone: nothing moves it.
+uint32_t ToolTouch::group_of(const Side &side) const {
+  const Moved &m = sides_[side.tool];
+  const uint32_t g = m.set ? m.set->group[side.part] : DFM_RIGID_STILL;
+  return g == DFM_RIGID_STILL ? kNone : first_group_[side.tool] + g;
+}
+
+uint32_t ToolTouch::island_of(const Row &row) const {
+  const uint32_t a = group_of(row.a), g = a != kNone ? a : group_of(row.b);
+  return g != kNone ? islands_.of[g] : kNone;
+}
+
 // Impulses of rows that contradict each other may be large while what they do cancels, and an impact repeats
 // itself in no later sub-step. Where impulses make the places of connected groups faster than none would,
 // none are the start.
 void ToolTouch::drop_bad_starts(const Views &views) {
-  std::vector<uint32_t> &first = first_group_;  // of each side, among all
+  std::vector<uint32_t> &first = first_group_;
   first.assign(1, 0);
   for (const Moved &m : sides_) first.push_back(first.back() + (m.set ? m.set->ngroup : 0));
-  const auto group_of = [&](const Side &side) {
-    const Moved &m = sides_[side.tool];
-    const uint32_t g = m.set ? m.set->group[side.part] : DFM_RIGID_STILL;
-    return g == DFM_RIGID_STILL ? kNone : first[side.tool] + g;
-  };
   islands_.start(first.back());
   for (const Row &row : rows_)
     if (const uint32_t a = group_of(row.a), b = group_of(row.b); a != kNone && b != kNone)
       islands_.join(a, b);
   start_speeds_.assign(islands_.number(), {});
   const auto speeds_of = [&](const Row &row) {
-    const uint32_t a = group_of(row.a), g = a != kNone ? a : group_of(row.b);
-    return g != kNone ? &start_speeds_[islands_.of[g]] : nullptr;
+    const uint32_t island = island_of(row);
+    return island != kNone ? &start_speeds_[island] : nullptr;
   };
   for (const Row &row : rows_)
     if (StartSpeeds *const s = speeds_of(row)) {

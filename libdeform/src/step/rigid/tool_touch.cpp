@@ -522,15 +522,31 @@ bool ToolTouch::follows_arcs(const Entities &entities, const Derived &derived, c
   return false;
 }
 
-// Rows without a response take no part in the solve, and one without a solution ends at its budget: both
-// leave things that go on closing. Jaws turn at the end of the sub-step only (turn_jaws).
-bool ToolTouch::jams(const Entities &entities, const Derived &derived, const Views &views,
-                     const FreeMotions &motions, const Budget &budget) const {
-  if (budget.cuts_solves() || !has_prescribed_motion(entities, views, motions)) return false;
-  return std::ranges::any_of(rows_, [&, slow = normal_at_rest(derived, h_)](const Row &row) {
-    const double closes = -dot(row.normal, speed(row));
-    return !row.pair->jaw && closes > slow && h_ * closes - row.gap > offset_;
-  });
+// Rows without a response take no part in the solve, and one without a solution ends at its budget: both go
+// on closing. Faces of jaws and motors yield by intent, and what nothing drives yields in the end.
+uint32_t ToolTouch::jammed_row(const Derived &derived) {
+  driven_.assign(start_speeds_.size(), 0);
+  const auto is_driven = [&](const Side &side) {
+    const Moved &m = sides_[side.tool];
+    const double *const v = &m.free[6 * size_t{side.part}];
+    return !m.responds && std::any_of(v, v + 6, [](double x) { return x != 0; });
+  };
+  for (const Row &row : rows_)
+    if (const uint32_t island = island_of(row); island != kNone && (is_driven(row.a) || is_driven(row.b)))
+      driven_[island] = 1;
+  const double slow = normal_at_rest(derived, h_);
+  double deepest = offset_;
+  uint32_t worst = kNone;
+  for (uint32_t i = 0; i < rows_.size(); ++i) {
+    const Row &row = rows_[i];
+    const uint32_t island = island_of(row);
+    const double closes = -(dot(row.normal, speed(row)) + row.lift), deep = h_ * closes - row.gap;
+    if (island == kNone || !driven_[island] || row.pair->jaw || row.soft > 0) continue;
+    if (!(closes > slow && deep > deepest)) continue;
+    deepest = deep;
+    worst = i;
+  }
+  return worst;
 }
 
 bool ToolTouch::begin(const WorldMemory &memory, const WorldState &state, const Entities &entities,

@@ -46,7 +46,6 @@ struct Awake;
 struct Budget;
 struct Derived;
 struct Entities;
-struct FreeMotions;
 struct Obstacle;
 struct RigidMember;
 struct RigidPair;
@@ -100,9 +99,9 @@ class ToolTouch {
   bool stays_out(const WorldMemory &memory, const WorldState &state, const Entities &entities,
                  const Derived &derived, const Awake &awake, const Views &views, SubStepTimes &times,
                  Budget &budget);
-  // Whether things that are deep in each other go deeper, because what drives them leaves them no way.
-  bool jams(const Entities &entities, const Derived &derived, const Views &views, const FreeMotions &motions,
-            const Budget &budget) const;
+  // The row of the two things that would end deepest in each other, of those that something driven leaves no
+  // way; kNone: none.
+  uint32_t jammed_row(const Derived &derived);
   // Turns the ends of the jaws.
   void turn_jaws();
   // Called at the end of an accepted sub-step: moves what lasts to the world.
@@ -202,6 +201,8 @@ class ToolTouch {
   static uint64_t key_of(const std::array<uint64_t, 2> &pair, Name name);
   double fastest(const Side &side, Vec3 around, double reach) const;
   Vec3 center(const Side &side) const;
+  uint32_t group_of(const Side &side) const;
+  uint32_t island_of(const Row &row) const;  // kNone: of things that nothing moves
   static double rate_of(const Moved &m, const Moved::Jaw &jaw);
   void straighten(Moved &m) const;
   void list_jaws(Moved &m);
@@ -284,10 +285,11 @@ class ToolTouch {
   uint32_t passes_ = 0;                // since motors were decided
   double changed_ = 0;                 // m/s, by the pass before
   DisjointSets islands_;               // of groups that rows connect
-  std::vector<uint32_t> first_group_;  // scratch
+  std::vector<uint32_t> first_group_;  // [sides] of each, among all groups
+  std::vector<uint8_t> driven_;        // [islands] scratch
   // m/s, the largest of places with and without the impulses of the start
   struct StartSpeeds { double with = 0, without = 0; };
-  std::vector<StartSpeeds> start_speeds_;          // scratch
+  std::vector<StartSpeeds> start_speeds_;          // [islands] scratch
   std::vector<std::array<uint64_t, 2>> reported_;  // pairs that have met and pass each other
   // By row.
   ContactState state_;

@@ -69,7 +69,7 @@ void keep_passive(const ToolMotion &m, ToolValues &v) {
 void check_tool_ways(const World &w, double dt) {
   for (auto &t : w.tools) {
     if (t->motion.coupled()) continue;
-    const ToolValues v = aimed(*t, motion_time(w, w, dt));
+    const ToolValues v = aimed(*t, w.time + dt);
     for (auto &o : w.obstacles) {
       if (o->rigid != t->set) continue;
       const Pose end = part_place(t->motion.parts[o->rigid_body], load_place(v.target), v.target_opening);
@@ -89,7 +89,7 @@ bool passes_through(const World &w, const Body &b, const Obstacle &o) {
 
 void begin_tools(World &w, double dt) {
   for (auto &t : w.tools) {
-    ToolValues v = aimed(*t, motion_time(w, w, dt));
+    ToolValues v = aimed(*t, w.time + dt);
     const double work = work_of(felt(*t, v, w.time), way_of(*t, v));
     v.port_work += work;
     v.tank = forgiven(v.tank + work, dt);

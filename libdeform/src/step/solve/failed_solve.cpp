@@ -82,17 +82,17 @@ bool report_failed_solve(World &w, StepContext &step, const LawInstance *law, ui
 }
 
 bool report_jam(const WorldState &state, const Entities &entities, const Detection &detection,
-                const Solution &solution, const Views &views, uint32_t *trouble) {
+                const Solution &solution, const Views &views, uint32_t row, uint32_t *trouble) {
   const ContactRows &rows = solution.rows;
-  uint32_t worst = kNone;
-  for (uint32_t i = 0; i < rows.n; ++i)
+  uint32_t worst = row;
+  for (uint32_t i = 0; row == kNone && i < rows.soft(); ++i)
     if (worst == kNone || rows.impulse[3 * size_t{i}] > rows.impulse[3 * size_t{worst}]) worst = i;
-  const ContactPoint *const c = worst < detection.contacts.size() ? &detection.contacts[worst] : nullptr;
+  const ContactPoint *const c = worst < rows.soft() ? &detection.contacts[worst] : nullptr;
   return fail_step(
       trouble, DFM_TROUBLE_UNCONVERGED,
-      "%s, %s: squeezed until nothing can move; open what closes on it, move that more slowly, or "
-      "make the body stiffer%s",
+      "%s, %s: squeezed until nothing can move; open what closes on it, or move that more slowly%s%s",
       at_step(state).c_str(), sides(entities, detection, solution, views, worst).c_str(),
+      c ? ", or make the body stiffer" : "",
       c ? hint_of_attachment(state, entities.bodies[c->slot_a]->id) : "");
 }
 
