@@ -463,6 +463,38 @@ TEST_F(PlannerScene, WhatIsLeftOut_IsNotClaimed) {
   EXPECT_TRUE(has(reported.out, "  chosen:   ") && has(reported.out, "  unknown:  whether")) << reported.out;
 }
 
+// What a mesh does to a dent, and to contacts of a body that nothing holds, is not predicted: neither claimed
+// nor denied. A held body that something wide presses is.
+TEST_F(PlannerScene, DentsAndContactsOfFreeBodies_AreNotClaimed) {
+  const std::string scene = bar(R"("accuracy": {"target": 0.9},)", R"("lattice": null, )");
+  const auto comes = [](const std::string &shape) {
+    return R"(/obstacles=[{"name": "o", )" + shape + R"(, "motion": {"keyframes": [
+        {"t": 0, "position": [0.3, 0.05, -0.13]}, {"t": 1, "position": [0.3, 0.05, -0.1]}]}}])";
+  };
+  const std::string
+      wide = comes(R"("shape": "box", "half_size": [1, 1, 0.1])"),
+      tip = comes(R"("shape": "sphere", "radius": 0.01)"),
+      floor = R"(/obstacles=[{"name": "o", "shape": "plane", "pose": {"position": [0, 0, -1e-3]}}])";
+  struct Case {
+    std::vector<std::string> set;
+    bool claimed;
+  };
+  for (const Case &c : {Case{{wide}, true}, {{tip}, false}, {{floor, "/bodies/0/fix=[]"}, false}}) {
+    std::vector<std::string> args = {"explain", scene, "--json"};
+    for (const std::string &set : c.set) args.insert(args.end(), {"--set", set});
+    const test::CommandResult r = test::deform(args);
+    EXPECT_EQ(r.exit_code, 0) << r.err;
+    EXPECT_TRUE(has(r.out, "touch something")) << r.out;
+    EXPECT_EQ(has(r.out, "\"meets\":true"), c.claimed) << r.out;
+    EXPECT_EQ(has(r.out, "\"meets\":null"), !c.claimed) << r.out;
+    EXPECT_EQ(has(r.out,
+                  "is not known: body 'bar': the prediction leaves out what its mesh does to its "
+                  "contacts"),
+              !c.claimed)
+        << r.out;
+  }
+}
+
 // The planner looks at a mesh, too; a host hears of it once.
 TEST_F(PlannerScene, Warnings_AreHeardOnce) {
   const std::string path = folder() + "/scene.json";

@@ -52,8 +52,8 @@ typedef struct dfm_mesh_info {
       overlapping_faces, ngroup;
   /* m3, of an open surface without meaning; m */
   double volume, edge_min, edge_median, edge_max;
-  /* mean ratio of the tetrahedra, 1 for a regular one, of a cube's 6 0.756; of triangles 4 sqrt(3) area /
-   * sum l2; bins of 0.1 */
+  /* mean ratio of the cells, at the worst node of each: 1 for a regular tetrahedron or a cube; of triangles
+   * 4 sqrt(3) area / sum l2; bins of 0.1 */
   double quality_min, quality_mean;
   uint32_t quality_histogram[10];
   double lo[3], hi[3];

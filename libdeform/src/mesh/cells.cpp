@@ -1,6 +1,8 @@
 #include "mesh/cells.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 
 #include "core/error.h"
 #include "deform/plugin.h"
@@ -15,12 +17,15 @@ constexpr uint32_t kNoPoint = UINT32_MAX;
 constexpr uint8_t kMshTet10[] = {0, 1, 2, 3, 4, 5, 6, 7, 9, 8};
 constexpr uint8_t kMshHex[] = {0,  1,  2,  3,  4,  5,  6,  7,  8,  11, 16, 9,  17, 10,
                                18, 19, 12, 15, 13, 14, 24, 22, 20, 21, 23, 25, 26};
+// GMF: edges as ours, then the faces below, above, y low, x high, y high, x low
+constexpr uint8_t kMeditHex[] = {0,  1,  2,  3,  4,  5,  6,  7,  8,  9,  10, 11, 12, 13,
+                                 14, 15, 16, 17, 18, 19, 24, 25, 22, 21, 23, 20, 26};
 constexpr CellKind kKinds[] = {
-    {DFM_CELL_TET, 4, 1, "tetrahedra", 4, 10, "Tetrahedra", nullptr},
-    {DFM_CELL_TET10, 10, 8, "second-order tetrahedra", 11, 24, "TetrahedraP2", kMshTet10},
-    {DFM_CELL_HEX8, 8, 6, "hexahedra", 5, 12, "Hexahedra", nullptr},
-    {DFM_CELL_HEX20, 20, 22, "hexahedra of 20 points", 17, 25, nullptr, kMshHex},
-    {DFM_CELL_HEX27, 27, 48, "hexahedra of 27 points", 12, 29, nullptr, kMshHex}};
+    {DFM_CELL_TET, 4, 1, "tetrahedra", 4, 10, "Tetrahedra", nullptr, nullptr},
+    {DFM_CELL_TET10, 10, 8, "second-order tetrahedra", 11, 24, "TetrahedraP2", kMshTet10, nullptr},
+    {DFM_CELL_HEX8, 8, 6, "hexahedra", 5, 12, "Hexahedra", nullptr, nullptr},
+    {DFM_CELL_HEX20, 20, 22, "hexahedra of 20 points", 17, 25, nullptr, kMshHex, nullptr},
+    {DFM_CELL_HEX27, 27, 48, "hexahedra of 27 points", 12, 29, "HexahedraQ2", kMshHex, kMeditHex}};
 // middles of the edges 01 12 02 03 13 23 are 4 to 9
 constexpr uint8_t kTets[8][4] = {{0, 4, 6, 7}, {4, 1, 5, 8}, {6, 5, 2, 9}, {7, 8, 9, 3},
                                  {6, 8, 7, 4}, {6, 8, 9, 7}, {6, 8, 5, 9}, {6, 8, 4, 5}};
@@ -60,18 +65,62 @@ Vec3 place_of(uint32_t node) {
   return {double(kPlace[node][0]), double(kPlace[node][1]), double(kPlace[node][2])};
 }
 
-// The determinant of the derivative of the place by the three coordinates there; points [n,stride].
-double jacobian(uint32_t nodes, const double *points, size_t stride, const uint32_t *cell, Vec3 at) {
-  double value[kMaxNodes];
-  Vec3 slope[kMaxNodes], along[3];
-  cell_shapes(nodes, at, value, slope);
+// Place of a node in the coordinates of its cell.
+Vec3 node_place(uint32_t nodes, uint32_t node) {
+  if (nodes != 10) return place_of(node);
+  constexpr Vec3 kCorner[4] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  if (node < 4) return kCorner[node];
+  return 0.5 * (kCorner[kTetEdges[node - 4][0]] + kCorner[kTetEdges[node - 4][1]]);
+}
+
+using Columns = std::array<Vec3, 3>;
+// Derivatives of the place by the three coordinates, where the shape functions have these slopes; points
+// [n,stride].
+Columns columns(uint32_t nodes, const double *points, size_t stride, const uint32_t *cell,
+                const Vec3 *slope) {
+  Columns along;
   for (uint32_t k = 0; k < nodes; ++k) {
     const Vec3 x = load3(points + stride * cell[k]);
     along[0] += slope[k].x * x;
     along[1] += slope[k].y * x;
     along[2] += slope[k].z * x;
   }
-  return dot(along[0], cross(along[1], along[2]));
+  return along;
+}
+
+double determinant(const Columns &j) { return dot(j[0], cross(j[1], j[2])); }
+
+double jacobian(uint32_t nodes, const double *points, size_t stride, const uint32_t *cell, Vec3 at) {
+  double value[kMaxNodes];
+  Vec3 slope[kMaxNodes];
+  cell_shapes(nodes, at, value, slope);
+  return determinant(columns(nodes, points, stride, cell, slope));
+}
+
+constexpr double kGauss = 0.57735026918962576451;  // of two points
+
+// Slopes of the shape functions at the points of the rule.
+struct RuleSlopes {
+  uint32_t n = 0;
+  Vec3 slope[kMaxNodes][kMaxNodes];
+
+  explicit RuleSlopes(uint32_t nodes) {
+    double value[kMaxNodes];
+    const auto add = [&](Vec3 at) { cell_shapes(nodes, at, value, slope[n++]); };
+    constexpr double kThird = 1.0 / 3;
+    constexpr Vec3 kTet[8] = {
+        {0, 0, 0},           {1, 0, 0},           {0, 1, 0},          {0, 0, 1}, {kThird, kThird, kThird},
+        {0, kThird, kThird}, {kThird, 0, kThird}, {kThird, kThird, 0}};
+    if (nodes == 10)
+      for (const Vec3 &at : kTet) add(at);
+    for (uint32_t q = 0; nodes == 8 && q < 8; ++q) add(kGauss * place_of(q));
+    for (uint32_t q = 0; nodes > 10 && q < kInsidePoints; ++q) add(inside_place(q));
+  }
+};
+
+const RuleSlopes &rule_slopes(uint32_t nodes) {
+  static const RuleSlopes eight(8), ten(10), twenty(20), all(27);
+  return nodes == 8 ? eight : nodes == 10 ? ten : nodes == 20 ? twenty : all;
 }
 
 }  // namespace
@@ -135,7 +184,7 @@ void mass_shares(const CellKind &kind, const double *points, const uint32_t *cel
     for (uint32_t k = 0; k < kind.nodes; ++k) out[k] = kind.nodes == 4 ? 0.25 : k < 4 ? 1.0 / 36 : 4.0 / 27;
     return;
   }
-  constexpr double kGauss = 0.57735026918962576451, kShare[3] = {5.0 / 18, 8.0 / 18, 5.0 / 18};
+  constexpr double kShare[3] = {5.0 / 18, 8.0 / 18, 5.0 / 18};
   std::fill_n(out, kind.nodes, 0.0);
   double all = 0;
   const uint32_t n = kind.nodes == 8 ? 8 : 27;
@@ -198,23 +247,32 @@ void cell_shapes(uint32_t nodes, Vec3 at, double *value, Vec3 *slope) {
   }
 }
 
-bool is_inverted(const CellKind &kind, const double *points, size_t stride, const uint32_t *cell) {
-  const auto inverts = [&](double x, double y, double z) {
-    return jacobian(kind.nodes, points, stride, cell, {x, y, z}) < 0;
-  };
-  if (kind.nodes == 10) {
-    constexpr double k = 1.0 / 3;
-    constexpr double kAt[][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1},
-                                 {k, k, k}, {0, k, k}, {k, 0, k}, {k, k, 0}};
-    return std::ranges::any_of(kAt, [&](const double *at) { return inverts(at[0], at[1], at[2]); });
+double cell_quality(const CellKind &kind, const double *points, const uint32_t *cell) {
+  if (kind.nodes == 4) return tet_quality(points, cell);
+  double value[kMaxNodes], least = 1;
+  Vec3 slope[kMaxNodes];
+  for (uint32_t k = 0; k < kind.nodes; ++k) {
+    cell_shapes(kind.nodes, node_place(kind.nodes, k), value, slope);
+    Columns j = columns(kind.nodes, points, 3, cell, slope);
+    double square = norm2(j[0]) + norm2(j[1]) + norm2(j[2]), by = 1;
+    if (kind.nodes ==
+        10) {  // T = J W^-1, W the edges of a regular tetrahedron of length 1, det W = sqrt(1/2)
+      square = 1.5 * square - (dot(j[0], j[1]) + dot(j[1], j[2]) + dot(j[2], j[0]));
+      by = std::sqrt(2.0);
+    }
+    const double length = std::sqrt(square / 3);
+    if (!(length > 0)) return 0;
+    for (Vec3 &along : j) along = (1 / length) * along;  // neither nanometers nor kilometers leave the range
+    const double volume = by * determinant(j), root = std::cbrt(std::fabs(volume));
+    least = std::min(least, std::copysign(root * root, volume));
   }
-  constexpr double kTwo[] = {-0.577350269189625765, 0.577350269189625765},
-                   kThree[] = {-0.774596669241483377, 0, 0.774596669241483377};
-  const std::span<const double> along = kind.nodes == 8 ? std::span<const double>(kTwo) : kThree;
-  for (const double x : along)
-    for (const double y : along)
-      for (const double z : along)
-        if (inverts(x, y, z)) return true;
+  return least;
+}
+
+bool inverted_cell(const CellKind &kind, const double *points, size_t stride, const uint32_t *cell) {
+  const RuleSlopes &rule = rule_slopes(kind.nodes);
+  for (uint32_t q = 0; q < rule.n; ++q)
+    if (determinant(columns(kind.nodes, points, stride, cell, rule.slope[q])) < 0) return true;
   return false;
 }
 

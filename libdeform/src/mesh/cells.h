@@ -14,9 +14,10 @@ namespace dfm {
 struct CellKind {
   uint32_t kind, nodes, tets;
   const char *name;
-  uint8_t msh, vtk;       // types of these files
-  const char *medit;      // null: not in these files
-  const uint8_t *in_msh;  // place of each node of an MSH file in ours; null: the same
+  uint8_t msh, vtk;   // types of these files
+  const char *medit;  // null: not in these files
+  // place of each node of an MSH or Medit file in ours; null: the same
+  const uint8_t *in_msh, *in_medit;
 };
 inline constexpr uint32_t kMaxNodes = 27;
 // All kinds.
@@ -48,11 +49,16 @@ Vec3 inside_place(uint32_t point);
 // Shape functions of a cell of 8, 10, 20 or 27 nodes at a place in its coordinates, and their derivatives by
 // these: -1 to 1 in a hexahedron; in a tetrahedron 0 to 1 along the edges at its first corner.
 void cell_shapes(uint32_t nodes, Vec3 at, double *value, Vec3 *slope);
-// Whether a cell of more than four nodes is inverted at one of the points at which models integrate: corners
-// and centers of faces of a tetrahedron, those of Gauss in a hexahedron. Parts between nodes may fold beside
-// them.
-bool is_inverted(const CellKind &kind, const double *points, size_t stride, const uint32_t *cell);
-// The same of a cell that is in part material, in the middle of that.
+// Mean ratio of a cell at its worst node: 3 det(T)^(2/3) / |T|^2, negative where it is inverted, T being the
+// Jacobian there of the map from a cube or a regular tetrahedron (P. Knupp 2003, Algebraic mesh quality
+// metrics for unstructured initial meshes). Of a first-order tetrahedron tet_quality().
+double cell_quality(const CellKind &kind, const double *points, const uint32_t *cell);
+
+// Whether a cell that is no first-order tetrahedron is inside out at one of the points by which models
+// integrate over it (plugins/model_common/cells.h). Tetrahedra of its points may be while it is not: those at
+// a corner, where it is pressed in beyond the middles of its edges.
+bool inverted_cell(const CellKind &kind, const double *points, size_t stride, const uint32_t *cell);
+// Whether the material of a cell is turned inside out, in its middle.
 bool inverted_inside(const double *points, size_t stride, const uint32_t *cell, const double *inside);
 // Calls use(volume, place) for each: the sum of volume f(place) is the integral over the material.
 void each_inside(const double *points, size_t stride, const uint32_t *cell, const double *inside,

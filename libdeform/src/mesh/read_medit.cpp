@@ -27,9 +27,11 @@ class MeditReader {
       } else if (word == "Tetrahedra") read_volume(points, DFM_CELL_TET);
       else if (word == "TetrahedraP2") read_volume(points, DFM_CELL_TET10);
       else if (word == "Hexahedra" || word == "Hexaedra") read_volume(points, DFM_CELL_HEX8);
+      else if (word == "HexahedraQ2") read_volume(points, DFM_CELL_HEX27);
       else if (word == "Triangles") read_cells(points, "triangles", 3, 2);
       else if (word == "TrianglesP2") read_cells(points, "second-order triangles", 6, 2);
       else if (word == "Quadrilaterals") read_cells(points, "quadrilaterals", 4, 2);
+      else if (word == "QuadrilateralsQ2") read_cells(points, "second-order quadrilaterals", 9, 2);
       else if (word == "Edges") read_cells(points, "edges", 2, 1);
       else if (is_lost(word)) refuse_if_any(word);
       else if (word == "End") ended = true;
@@ -71,13 +73,14 @@ class MeditReader {
     if (!points) in_.refuse("%s before Vertices; expected Vertices first", what);
     const uint64_t n = in_.text_count(in_.integer("a number of elements"), corners + 1, what);
     if (kind == DFM_CELL_TET) out_.expect_tets(n);
-    uint32_t corner[10];
+    const uint8_t *const place = dimension == 3 ? cell_kind(kind).in_medit : nullptr;
+    uint32_t corner[kMaxNodes];
     for (uint64_t i = 0; i < n; ++i) {
-      for (uint32_t k = 0; k < corners; ++k) corner[k] = point();
+      for (uint32_t k = 0; k < corners; ++k) corner[place ? place[k] : k] = point();
       const int32_t reference = in_.in_32_bits(in_.integer("an element's reference"), "reference");
       const uint32_t group = out_.group(in_, dimension, reference);
       if (dimension == 3) out_.add_cell(in_, kind, corner, group);
-      else if (corners == 6) out_.add_second_order(in_, corner, 6, group);
+      else if (corners > 4) out_.add_second_order(in_, corner, corners, group);
       else if (dimension == 2) out_.add_polygon(in_, corner, corners, group);
       else out_.keep_points(corner, corners, group);
     }
@@ -99,7 +102,7 @@ class MeditReader {
   void refuse_if_any(std::string_view what) {
     if (in_.integer("a number of elements") == 0) return;
     in_.unsupported(
-        "%.*s; tetrahedra of 4 and 10 points and hexahedra of 8 are read: mesh the volume with one of these",
+        "%.*s; tetrahedra of 4 and 10 points and hexahedra of 8 and 27 are read: mesh the volume with these",
         int(what.size()), what.data());
   }
 

@@ -206,12 +206,11 @@ void measure_cells(const RestMesh &mesh, dfm_mesh_info &s) {
   }
   s.npiece = count_pieces(memory, s.npoint, mesh.tets, 4);
   s.duplicate_points = count_duplicate_points(mesh);
-  size_t flat = SIZE_MAX;  // the last such cell
-  put_qualities(s.ntet, s, [&](size_t t) {
-    const uint32_t *tet = &mesh.tets[4 * t];
-    const double q = tet_quality(mesh.points.data(), tet);
-    s.volume += tet_volume(mesh.points.data(), tet);
-    if (const size_t c = t * s.ncell / s.ntet; q < 0.01) s.flat_cells += std::exchange(flat, c) != c;
+  for (size_t t = 0; t < mesh.tets.size(); t += 4) s.volume += tet_volume(mesh.points.data(), &mesh.tets[t]);
+  const CellKind &kind = cell_kind(mesh.cell);
+  put_qualities(s.ncell, s, [&](size_t c) {
+    const double q = cell_quality(kind, mesh.points.data(), &mesh.nodes()[kind.nodes * c]);
+    s.flat_cells += q < 0.01;
     return q;
   });
   s.wave_path = wave_path(mesh);

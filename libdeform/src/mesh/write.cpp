@@ -69,18 +69,18 @@ class TextRows {
     }
   }
   void elements(const char *keyword, uint32_t corners, const Array<uint32_t> &points,
-                const Array<uint32_t> &group, const RestMesh &mesh) {
+                const Array<uint32_t> &group, const RestMesh &mesh, const uint8_t *in_file = nullptr) {
     if (group.empty()) return;
     out_.write(std::string(keyword) + "\n" + std::to_string(group.size()) + "\n");
     for (size_t t = 0; t < group.size(); ++t) {
-      for (uint32_t k = 0; k < corners; ++k) put(points[corners * t + k] + 1, ' ');
+      for (uint32_t k = 0; k < corners; ++k) put(points[corners * t + (in_file ? in_file[k] : k)] + 1, ' ');
       put(group[t] == kNoGroup ? 0 : mesh.groups[group[t]].tag, '\n');
     }
   }
 
  private:
   AtomicFile &out_;
-  char row_[256];
+  char row_[512];
   size_t used_ = 0;
 };
 
@@ -152,7 +152,7 @@ void write_medit(const RestMesh &mesh, const std::string &path) {
     rows.put(0, '\n');
   }
   rows.elements("Triangles", 3, mesh.tris, mesh.tri_group, mesh);
-  rows.elements(kind.medit, kind.nodes, mesh.nodes(), mesh.cell_groups(), mesh);
+  rows.elements(kind.medit, kind.nodes, mesh.nodes(), mesh.cell_groups(), mesh, kind.in_medit);
   out.write("End\n");
   out.commit();
 }

@@ -56,8 +56,8 @@ struct Obstacle : ObstacleState {
   ObstacleView view() const;
   ObstacleShape standing() const { return ObstacleShape(view()); }
   // Where it is at the end of a sub-step, in a step whose remaining time is `left`. rest: s, to the end of
-  // the planned sub-step, of which this is a piece if h is less. The obstacle goes straight to where it has to be
-  // then: what it was held back earlier, it catches up in that time and not in the first piece.
+  // the planned sub-step, of which this is a piece if h is less. The obstacle goes straight to where it has
+  // to be then: what it was held back earlier, it catches up in that time and not in the first piece.
   Pose end_pose(double h, double left, double rest) const;
 };
 

@@ -28,7 +28,7 @@ uint32_t inverted_cells(const Body &b) {
   uint32_t n = 0;
   for (size_t c = 0; c < b.cells.size() / kind.nodes; ++c) {
     const uint32_t *const cell = &b.cells[kind.nodes * c];
-    n += b.inside.empty() ? is_inverted(kind, x, kStride, cell)
+    n += b.inside.empty() ? inverted_cell(kind, x, kStride, cell)
                           : inverted_inside(x, kStride, cell, &b.inside[kInsidePoints * c]);
   }
   return n * kind.tets;

@@ -7,7 +7,8 @@ namespace dfm {
 struct Body;
 struct World;
 
-// Tetrahedra that are inside out; of a lattice those of cells whose material is, in its middle.
+// Tetrahedra that are inside out; of other cells those of cells that are at a point of their rule, of a
+// lattice those of cells whose material is, in its middle.
 uint32_t inverted_cells(const Body &b);
 
 inline constexpr double kBoundShare = 0.9;  // of the bound, that is used

@@ -1,6 +1,7 @@
 // Second-order tetrahedra and hexahedra as meshes: their tetrahedra, masses, files, and what is refused.
 #include "mesh/cells.h"
 
+#include <cmath>
 #include <map>
 #include <numeric>
 #include <random>
@@ -117,37 +118,6 @@ TEST_P(Cells, Files_GiveBackCellsGroupsAndPoints) {
   }
 }
 
-// A cell is inverted where its mapping is, not where the straight parts between its nodes are. A corner of a
-// hexahedron of 20 points that is pushed in beyond the middles of its edges folds the part there. The
-// Jacobian stays positive at all points of integration until the corner is a fifth of the diagonal inside.
-TEST_P(Cells, AreInverted_WhereTheirMappingIs) {
-  const CellKind &kind = cell_kind(GetParam());
-  RestMesh mesh = made(GetParam());
-  const uint32_t *const cell = mesh.cells.data();
-  EXPECT_FALSE(is_inverted(kind, mesh.points.data(), 3, cell));
-  Array<double> mirrored = mesh.points;
-  for (size_t i = 0; i < mirrored.size(); i += 3) mirrored[i] *= -1;
-  EXPECT_TRUE(is_inverted(kind, mirrored.data(), 3, cell));
-  if (GetParam() != DFM_CELL_HEX20) return;
-  const auto pushed = [&](double share) {  // of the cell's diagonal
-    Array<double> points = mesh.points;
-    for (size_t k = 0; k < 3; ++k)
-      points[3 * size_t{cell[0]} + k] +=
-          share * (mesh.points[3 * size_t{cell[6]} + k] - mesh.points[3 * size_t{cell[0]} + k]);
-    return points;
-  };
-  const Array<double> folded = pushed(0.18), inverted = pushed(0.25);
-  uint32_t parts = 0;
-  for (uint32_t t = 0; t < kind.tets; ++t) {
-    const uint32_t *const q = &mesh.tets[4 * size_t{t}];
-    const auto at = [&](int k) { return load3(&folded[3 * size_t{q[k]}]); };
-    parts += dot(at(1) - at(0), cross(at(2) - at(0), at(3) - at(0))) < 0;
-  }
-  EXPECT_GT(parts, 0u);
-  EXPECT_FALSE(is_inverted(kind, folded.data(), 3, cell));
-  EXPECT_TRUE(is_inverted(kind, inverted.data(), 3, cell));
-}
-
 // A quadratic field over the nodes of second-order cells has its own value at every place, in the cells and
 // outside; a linear one over those of the others.
 TEST_P(Cells, Finder_FollowsTheFieldsOfTheCells) {
@@ -174,6 +144,77 @@ TEST_P(Cells, Finder_FollowsTheFieldsOfTheCells) {
     outside += away > 0;
   }
   EXPECT_GT(outside, 0u);
+}
+
+// A cell that is a cube of side 1 or a regular tetrahedron.
+RestMesh regular(uint32_t kind) {
+  RestMesh tet(kMemory);
+  tet.points = {0, 0, 0, 1, 0, 0, 0.5, std::sqrt(0.75), 0, 0.5, std::sqrt(1.0 / 12), std::sqrt(2.0 / 3)};
+  tet.tets = {0, 1, 2, 3};
+  tet.tet_group = {kNoGroup};
+  tet.file_point = {0, 1, 2, 3};
+  if (kind == DFM_CELL_TET10) return second_order(tet);
+  const RestMesh cube = make_bricks(kMemory, 1, 1, 1, 1);
+  if (kind == DFM_CELL_HEX8) return cube;
+  return kind == DFM_CELL_HEX27 ? second_order(cube) : test::of_twenty(second_order(cube));
+}
+
+TEST_P(Cells, Quality_IsTheMeanRatioAtTheWorstNode) {
+  const CellKind &kind = cell_kind(GetParam());
+  const RestMesh cell = regular(GetParam());
+  for (const double size : {1e-9, 1.0, 1e9}) {
+    RestMesh of = cell;
+    for (double &x : of.points) x *= size;
+    EXPECT_NEAR(cell_quality(kind, of.points.data(), of.cells.data()), 1, 1e-12);
+  }
+  RestMesh longer = cell;
+  for (size_t k = 0; k < longer.points.size(); k += 3) longer.points[k] *= 2;
+  const double of_cube = 3 * std::cbrt(4.0) / 6,
+               of_tet = tet_quality(longer.points.data(), cell.cells.data());
+  EXPECT_NEAR(cell_quality(kind, longer.points.data(), longer.cells.data()),
+              kind.nodes == 10 ? of_tet : of_cube, 1e-12);
+  const dfm_mesh_info info = mesh_statistics(longer);
+  EXPECT_NEAR(info.quality_min, kind.nodes == 10 ? of_tet : of_cube, 1e-12);
+  EXPECT_EQ(std::accumulate(info.quality_histogram, info.quality_histogram + 10, 0u), info.ncell);
+  if (kind.nodes == 8) return;
+  // with the middle of an edge at a quarter of it the Jacobian is zero at the corner there
+  const uint32_t middle = kind.nodes == 10 ? 4 : 8;
+  double before = 1;
+  for (const double share : {0.4, 0.3, 0.26, 0.24, 0.2}) {
+    RestMesh moved = cell;
+    for (size_t k = 0; k < 3; ++k) {
+      const double a = cell.points[3 * cell.cells[0] + k], b = cell.points[3 * cell.cells[1] + k];
+      moved.points[3 * moved.cells[middle] + k] = a + share * (b - a);
+    }
+    const double quality = cell_quality(kind, moved.points.data(), moved.cells.data());
+    EXPECT_LT(quality, before) << share;
+    EXPECT_EQ(quality > 0, share > 0.25) << share;
+    EXPECT_EQ(mesh_statistics(moved).flat_cells, share < 0.25 ? 1u : 0u) << share;
+    before = quality;
+  }
+}
+
+// A corner that is pushed in: first beyond the middles of its edges, where tetrahedra of 20 points turn
+// inside out, then so far that the material does.
+TEST_P(Cells, Inversion_IsThatOfTheMaterial) {
+  const CellKind &kind = cell_kind(GetParam());
+  const RestMesh cell = regular(GetParam());
+  const auto pushed = [&](double share) {
+    RestMesh out = cell;
+    Vec3 middle;
+    for (uint32_t p = 0; p < cell.npoint(); ++p)
+      middle += (1.0 / cell.npoint()) * load3(&cell.points[3 * size_t{p}]);
+    double *const corner = &out.points[3 * size_t{cell.cells[0]}];
+    store3(corner, load3(corner) + share * (middle - load3(corner)));
+    return out;
+  };
+  for (const double share : {0.0, 0.1, 0.36, 1.2}) {
+    const RestMesh of = pushed(kind.nodes == 10 ? 0.8 * share : share);
+    uint32_t tets = 0;
+    for (size_t t = 0; t < of.tets.size(); t += 4) tets += tet_volume(of.points.data(), &of.tets[t]) < 0;
+    EXPECT_TRUE(kind.nodes != 20 || tets > 0 || share < 0.35) << share;
+    EXPECT_EQ(inverted_cell(kind, of.points.data(), 3, of.cells.data()), share > 1) << share;
+  }
 }
 
 // Their sum is 1, that of the slopes 0, and each is 1 at its node.
@@ -240,6 +281,39 @@ TEST(CellFiles, GmshsHexahedraOfSecondOrder_AreReordered) {
     EXPECT_EQ(mesh.tri_group.size(), nodes == 20 ? 6u : 8u);
     EXPECT_TRUE(on_boundary(mesh));
   }
+}
+
+// The order of GMF: corners, edges as VTK's, faces below, above, y low, x high, y high, x low, middle. The
+// map is quadratic.
+TEST(CellFiles, MeditsHexahedraOfSecondOrder_AreReordered) {
+  const int of[27][3] = {{0, 0, 0}, {2, 0, 0}, {2, 2, 0}, {0, 2, 0}, {0, 0, 2}, {2, 0, 2}, {2, 2, 2},
+                         {0, 2, 2}, {1, 0, 0}, {2, 1, 0}, {1, 2, 0}, {0, 1, 0}, {1, 0, 2}, {2, 1, 2},
+                         {1, 2, 2}, {0, 1, 2}, {0, 0, 1}, {2, 0, 1}, {2, 2, 1}, {0, 2, 1}, {1, 1, 0},
+                         {1, 1, 2}, {1, 0, 1}, {2, 1, 1}, {1, 2, 1}, {0, 1, 1}, {1, 1, 1}};
+  const auto map = [](Vec3 x) {
+    return Vec3{x.x + 0.125 * x.y * x.z, x.y - 0.0625 * x.x * x.x, x.z + 0.0625 * x.x * x.y};
+  };
+  std::string text = "MeshVersionFormatted 2\nDimension 3\nVertices\n27\n", list;
+  for (uint32_t k = 0; k < 27; ++k) {
+    const Vec3 x = map({double(of[k][0]), double(of[k][1]), double(of[k][2])});
+    text += std::to_string(x.x) + " " + std::to_string(x.y) + " " + std::to_string(x.z) + " 0\n";
+    list += std::to_string(k + 1) + " ";
+  }
+  text += "QuadrilateralsQ2\n1\n1 2 3 4 9 10 11 12 21 7\nHexahedraQ2\n1\n" + list + "0\nEnd\n";
+  const RestMesh mesh = finish_mesh("a.mesh", parse_raw(kMemory, "a.mesh", text.data(), text.size()));
+  const RestMesh unit = second_order(make_bricks(kMemory, 2, 2, 2, 1));
+  ASSERT_EQ(mesh.cell, uint32_t(DFM_CELL_HEX27));
+  for (uint32_t k = 0; k < 27; ++k)
+    EXPECT_EQ(norm(load3(&mesh.points[3 * size_t{mesh.cells[k]}]) -
+                   map(load3(&unit.points[3 * size_t{unit.cells[k]}]))),
+              0)
+        << k;
+  const CellKind &kind = cell_kind(mesh.cell);
+  EXPECT_GT(cell_quality(kind, mesh.points.data(), mesh.cells.data()), 0.8);
+  EXPECT_FALSE(inverted_cell(kind, mesh.points.data(), 3, mesh.cells.data()));
+  EXPECT_EQ(mesh.turned, 0u);
+  EXPECT_EQ(mesh.tri_group.size(), 8u);
+  EXPECT_TRUE(on_boundary(mesh));
 }
 
 const std::string kMsh22 = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n";
