@@ -605,6 +605,12 @@ class Outputs(InAFolder):
         if importlib.util.find_spec("distributed") is None:
             return
         import distributed
+
+        def clear():  # what is killed cannot remove its folder
+            for left in self.tmp.glob("*deform-study-*"):
+                shutil.rmtree(left)
+
+        self.addCleanup(clear)
         study = sweep_study(self.scene, design={"method": "sobol", "runs": 40})
         killed = []
         with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:

@@ -141,7 +141,7 @@ TEST(MeshRead, MeditStructure_IsChecked) {
   expect_refusal("m.mesh", head + four + "Tetrahedra 2\n1 2 3 4 0\n1 2 3 4 ", DFM_E_FORMAT, {"reference"});
   expect_refusal("m.mesh", head + "End\n", DFM_E_FORMAT, {"no Vertices"});
   expect_refusal("m.mesh", head + four + "7 7\n", DFM_E_FORMAT, {"keyword", "'7'"});
-  for (const char *kind : {"Prisms", "HexahedraQ2", "TetrahedraP3", "TetrahedraP2Ordering"})
+  for (const char *kind : {"Prisms", "HexahedraP3", "TetrahedraP3", "TetrahedraP2Ordering"})
     expect_refusal("m.mesh", head + four + kind + " 1\n1 2 3 4 1 2 3 4 1 2 0\nEnd\n", DFM_E_UNSUPPORTED,
                    {kind, "hexahedra of 8"});
 }

@@ -18,6 +18,7 @@
 namespace dfm {
 
 struct StepContext;
+struct SubStepTimes;
 struct World;
 
 struct SolveIsland final : SolveLaws {
