@@ -1,6 +1,10 @@
 #include "vulkan.h"
 
+#ifdef _WIN32
+#include <windows.h>
+#else
 #include <dlfcn.h>
+#endif
 
 #include <cstddef>
 #include <vector>
@@ -41,6 +45,27 @@ int rank_of(VkPhysicalDeviceType type) {
 }
 constexpr int kSoftware = 4;
 
+// The entry of the Vulkan loader, which is never closed: a driver that is loaded again takes longer than all
+// else here.
+PFN_vkGetInstanceProcAddr loader() {
+#ifdef _WIN32
+  const HMODULE library = LoadLibraryExW(L"vulkan-1.dll", nullptr, LOAD_LIBRARY_SEARCH_SYSTEM32);
+  if (!library)
+    throw std::string(
+        "the Vulkan loader vulkan-1.dll is not installed; install the driver of the graphics card, or take "
+        "the model without _gpu");
+  return reinterpret_cast<PFN_vkGetInstanceProcAddr>(
+      reinterpret_cast<void *>(GetProcAddress(library, "vkGetInstanceProcAddr")));
+#else
+  void *const library = dlopen("libvulkan.so.1", RTLD_NOW | RTLD_LOCAL);
+  if (!library)
+    throw std::string(
+        "the Vulkan loader libvulkan.so.1 is not installed; install libvulkan1 and the driver of the "
+        "graphics card (without a card mesa-vulkan-drivers), or take the model without _gpu");
+  return reinterpret_cast<PFN_vkGetInstanceProcAddr>(dlsym(library, "vkGetInstanceProcAddr"));
+#endif
+}
+
 }  // namespace
 
 void must(VkResult result, const char *what) {
@@ -63,13 +88,7 @@ Vulkan::Vulkan(Wanted wanted) {
 Vulkan::~Vulkan() { close(); }
 
 void Vulkan::open_instance() {
-  // never closed: a driver that is loaded again takes longer than all else here
-  void *const library = dlopen("libvulkan.so.1", RTLD_NOW | RTLD_LOCAL);
-  if (!library)
-    throw std::string(
-        "the Vulkan loader libvulkan.so.1 is not installed; install libvulkan1 and the driver of the "
-        "graphics card (without a card mesa-vulkan-drivers), or take the model without _gpu");
-  const auto get = reinterpret_cast<PFN_vkGetInstanceProcAddr>(dlsym(library, "vkGetInstanceProcAddr"));
+  const PFN_vkGetInstanceProcAddr get = loader();
   const auto create =
       get ? reinterpret_cast<PFN_vkCreateInstance>(get(nullptr, "vkCreateInstance")) : nullptr;
   VkApplicationInfo app{};
@@ -80,7 +99,7 @@ void Vulkan::open_instance() {
   info.pApplicationInfo = &app;
   if (!create || create(&info, nullptr, &instance_) != VK_SUCCESS)
     throw std::string(
-        "libvulkan.so.1 finds no Vulkan driver on this machine; install that of the graphics card "
+        "the Vulkan loader finds no driver on this machine; install that of the graphics card "
         "(without a card mesa-vulkan-drivers), or take the model without _gpu");
 #define DEFORM_GPU_GET(name) name = reinterpret_cast<PFN_vk##name>(get(instance_, "vk" #name));
   DEFORM_GPU_OF_INSTANCE(DEFORM_GPU_GET)

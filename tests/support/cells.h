@@ -7,8 +7,9 @@
 namespace test {
 
 struct Cells {
-  std::vector<double> points;  // [n,3]
-  std::vector<uint32_t> tets;  // [m,4]
+  std::vector<double> points;        // [n,3]
+  std::vector<uint32_t> tets;        // [m,4]
+  std::vector<uint32_t> nodes = {};  // [m / 8,10] of cells of second order, else empty
   uint32_t npoint() const { return uint32_t(points.size() / 3); }
   uint32_t ntet() const { return uint32_t(tets.size() / 4); }
   const double *point(uint32_t i) const { return &points[3 * size_t(i)]; }
@@ -39,6 +40,29 @@ inline Cells make_cells(dfm_context *c, const char *kind, std::array<double, 3> 
   lend(mesh, d);
   Cells out{{d.points, d.points + 3 * size_t(d.npoint)}, {d.tets, d.tets + 4 * size_t(d.ntet)}};
   ok(dfm_mesh_destroy(mesh));
+  return out;
+}
+
+// Corners of the edges of DFM_CELL_TET10, in the order of its nodes 4 to 9.
+constexpr size_t kTetEdge[6][2] = {{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}};
+
+// Cells that a generator made and a test changed, in second order: middles of straight edges.
+inline Cells second_order(dfm_context *c, const char *kind, std::array<double, 3> size, const Cells &cells) {
+  dfm_mesh_handle mesh = 0, fine = 0;
+  ok(dfm_mesh_make(c, kind, size.data(), DFM_MESH_CELLS, cells.ntet(), &mesh));
+  ok(dfm_mesh_second_order(mesh, &fine));
+  const dfm_mesh_info info = info_of(fine);
+  Cells out{cells.points,
+            {info.tets, info.tets + 4 * size_t(info.ntet)},
+            {info.cells, info.cells + 10 * size_t(info.ncell)}};
+  out.points.resize(3 * size_t(info.npoint));
+  for (uint32_t n = 0; n < 10 * info.ncell; n += 10)
+    for (size_t e = 0; e < 6; ++e)
+      for (int k = 0; k < 3; ++k)
+        out.points[3 * size_t(out.nodes[n + 4 + e]) + k] =
+            0.5 * (out.point(out.nodes[n + kTetEdge[e][0]])[k] + out.point(out.nodes[n + kTetEdge[e][1]])[k]);
+  ok(dfm_mesh_destroy(mesh));
+  ok(dfm_mesh_destroy(fine));
   return out;
 }
 
@@ -74,6 +98,8 @@ inline dfm_body make_body(dfm_world w, const Cells &cells, const BodyOptions &o,
   d.ntet = cells.ntet();
   d.points = cells.points.data();
   d.tets = cells.tets.data();
+  if (!cells.nodes.empty()) d.cell = DFM_CELL_TET10;
+  if (!cells.nodes.empty()) d.cells = cells.nodes.data();
   d.material = by_cell ? handles[0] : material(o.density, o.young);
   if (by_cell) d.cell_materials = of_cell.data();
   const dfm_param_value volume{"volume", &o.volume, 1};

@@ -8,6 +8,7 @@ import re
 
 from conan import ConanFile
 from conan.errors import ConanInvalidConfiguration
+from conan.tools.build import cross_building
 from conan.tools.cmake import CMake, CMakeDeps, CMakeToolchain, cmake_layout
 from conan.tools.files import copy, load
 from conan.tools.system.package_manager import Apt
@@ -44,8 +45,9 @@ class Deform(ConanFile):
         cmake_layout(self)
 
     def validate(self):
-        if self.settings.os != "Linux" or self.settings.arch != "x86_64":
-            raise ConanInvalidConfiguration("deform is developed and tested on Linux and x86-64 alone")
+        if (self.settings.os, self.settings.arch) not in (("Linux", "x86_64"), ("Linux", "armv8"),
+                                                          ("Windows", "x86_64")):
+            raise ConanInvalidConfiguration("deform is tested on Linux (x86_64, armv8) and Windows (x86_64)")
         if self.settings.compiler not in ("gcc", "clang"):
             raise ConanInvalidConfiguration("deform is developed and tested with gcc and clang alone")
 
@@ -60,7 +62,9 @@ class Deform(ConanFile):
     def system_requirements(self):
         if self.options.system:
             cli = ["libcli11-dev"] if self.options.cli else []
-            Apt(self).install(["libeigen3-dev", "nlohmann-json3-dev", "zlib1g-dev", *cli])
+            # headers serve every system; another one has zlib from its toolchain, or none
+            zlib = [] if cross_building(self) else ["zlib1g-dev"]
+            Apt(self).install(["libeigen3-dev", "nlohmann-json3-dev", *zlib, *cli], host_package=False)
 
     def generate(self):
         toolchain = CMakeToolchain(self)
@@ -70,6 +74,8 @@ class Deform(ConanFile):
             "DEFORM_CLI": bool(self.options.cli), "DEFORM_RENDER": False, "DEFORM_TESTS": False,
             "DEFORM_EXAMPLES": False, "DEFORM_VIEW": "OFF", "DEFORM_ODE": "OFF", "DEFORM_BULLET": "OFF",
             "DEFORM_ASSIMP": "OFF"})
+        if self.options.system and cross_building(self):   # its files may lack zlib, and so compressed VTU
+            toolchain.cache_variables["DEFORM_ZLIB"] = self.settings.os == "Windows"
         toolchain.generate()
         CMakeDeps(self).generate()
 

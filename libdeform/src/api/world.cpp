@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "api/objects.h"
+#include "core/lists.h"
 #include "cut/planned_cut.h"
 #include "cut/separate.h"
 #include "cut/tear.h"
@@ -87,8 +88,7 @@ void check_effects(const World &w) {
   std::vector<std::string> known = {kFriction, kGuard, kMemory, kSelfContact};
   for (const dfm_type *type : w.context->registry.list())
     for (const std::string &word : effects(*type)) known.push_back(word);
-  std::sort(known.begin(), known.end());
-  known.erase(std::unique(known.begin(), known.end()), known.end());
+  sort_unique(known);
   for (const char *const *word = w.def.effects; word && *word; ++word) {
     if (std::find(known.begin(), known.end(), *word) != known.end()) continue;
     fail(DFM_E_ARG, "effect '%s' is asked for, but no loaded plugin provides it%s; provided: %s", *word,

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/lists.h"
 #include "math/width.h"
 
 namespace dfm {
@@ -578,8 +579,7 @@ void ContactRows::motion_row(uint32_t i, Motions &out) const {
   each_rigid(i, [&](uint32_t d, Vec3 r, double sign, const double *) {
     put(d, [&](const double *at) { return sign * (load3(at) + dfm::cross(load3(at + 3), r)); });
   });
-  std::sort(out.touched.begin(), out.touched.end());
-  out.touched.erase(std::unique(out.touched.begin(), out.touched.end()), out.touched.end());
+  sort_unique(out.touched);
   if (arc.empty()) return;
   for (const uint32_t q : out.touched) std::copy_n(&out.g[size_t{9} * q], 9, &out.s[size_t{9} * q]);
   each_rigid(i, [&](uint32_t d, Vec3, double sign, const double *turns) {

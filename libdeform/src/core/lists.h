@@ -1,10 +1,18 @@
-// Lists one after the other in one array, by a counting sort: the items of list k are item[begin[k]] up to
-// item[begin[k + 1]], in the order in which they came.
+// Sorted arrays, and lists one after the other in one array by a counting sort: the items of list k are
+// item[begin[k]] up to item[begin[k + 1]], in the order in which they came.
 #pragma once
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 
 namespace dfm {
+
+// Ascending, each once.
+template <class Items>
+void sort_unique(Items &items) {
+  std::sort(items.begin(), items.end());
+  items.erase(std::unique(items.begin(), items.end()), items.end());
+}
 
 // each(use) calls use(list, item) for all of them, and does so twice.
 template <class Begin, class Items, class Each>

@@ -256,10 +256,7 @@ void find_coincident(const Memory &m, const WholeBody &whole, const CutRecord &r
     surface.coincident.push_back(t);
     for (size_t k = 0; k < 3; ++k) surface.coincident_surfel.push_back(surface.tri[3 * size_t{t} + k]);
   }
-  std::sort(surface.coincident_surfel.begin(), surface.coincident_surfel.end());
-  surface.coincident_surfel.erase(
-      std::unique(surface.coincident_surfel.begin(), surface.coincident_surfel.end()),
-      surface.coincident_surfel.end());
+  sort_unique(surface.coincident_surfel);
   std::sort(found.begin(), found.end());
   surface.coincident_tip.assign(surface.coincident.size(), 0);
   for (size_t i = 1; i < found.size(); ++i) {

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/lists.h"
 #include "cut/blade_sweep.h"
 #include "cut/body_shape.h"
 #include "cut/carry_state.h"
@@ -110,22 +111,17 @@ CutReport cut(Body &b, const Array<uint8_t> &removed, OpenFaces &&open) {
   return out;
 }
 
-void sort_out(Array<uint64_t> &list) {
-  std::sort(list.begin(), list.end());
-  list.erase(std::unique(list.begin(), list.end()), list.end());
-}
-
 // Faces that are open already and `more` (of the whole body).
 OpenFaces with_open(const Body &b, const Array<uint64_t> &more) {
   const HookAllocator<uint64_t> a(b.world->memory());
   OpenFaces out{Array<uint64_t>(b.cut.open, a), Array<uint64_t>(a)};
   out.whole.insert(out.whole.end(), more.begin(), more.end());
-  sort_out(out.whole);
+  sort_unique(out.whole);
   for (const uint64_t face : out.whole) {
     const auto [i, j] = present_cells(b, face);
     if (i != kNone && j != kNone) out.own.push_back(open_face(i, j));
   }
-  sort_out(out.own);
+  sort_unique(out.own);
   return out;
 }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/lists.h"
 #include "cut/blade_sweep.h"
 #include "cut/cut_ahead.h"
 #include "cut/separate.h"
@@ -271,8 +272,7 @@ void set_cuts(Tool &t, uint32_t how, uint32_t most, std::span<Body *const> bodie
   }
   for (const auto &b : w.bodies)  // which stay in the list when their whole is destroyed
     if (b->piece_of && std::count(ids.begin(), ids.end(), b->piece_of)) ids.push_back(b->id);
-  std::sort(ids.begin(), ids.end());
-  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+  sort_unique(ids);
   if (how == DFM_CUT_SPLIT)  // now, since it takes longer than a step
     for (Body *const b : bodies)
       if (b->inner.empty()) b->inner = inner_faces(*b);

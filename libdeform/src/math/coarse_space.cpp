@@ -85,8 +85,7 @@ void CoarseSpace::analyse(const BlockRows &rows, uint32_t n) {
     for (uint32_t k = member_begin_[p]; k < member_begin_[p + 1]; ++k)
       for (uint32_t e = rows.row[member_[k]]; e < rows.row[member_[k] + 1]; ++e)
         if (const uint32_t q = patch_[rows.column[e]]; q > p) found.push_back(q);
-    std::sort(found.begin(), found.end());
-    found.erase(std::unique(found.begin(), found.end()), found.end());
+    sort_unique(found);
     for (const uint32_t q : found) {
       near_.push_back(q);
       ij_.insert(ij_.end(), {2 * p, 2 * q, 2 * p, 2 * q + 1, 2 * p + 1, 2 * q + 1});

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/lists.h"
 #include "deform/plugin.h"
 #include "geometry/closest.h"
 
@@ -144,8 +145,7 @@ std::span<const uint32_t> CellFinder::weights(Vec3 x, uint32_t tet, double *w) c
 void CellFinder::near(Vec3 x, double far2, std::vector<uint32_t> &out) const {
   out.clear();
   tree_.near(x, far2, [&](uint32_t t) { out.push_back(t / kind_.tets); });
-  std::ranges::sort(out);
-  out.erase(std::unique(out.begin(), out.end()), out.end());
+  sort_unique(out);
 }
 
 }  // namespace dfm

@@ -173,8 +173,7 @@ void number_points(const Memory &memory, Filling &f) {
     for (const Site s : corner) sites.push_back(pack(s));
   }
   const Array<uint64_t> all = sites;
-  std::sort(sites.begin(), sites.end());
-  sites.erase(std::unique(sites.begin(), sites.end()), sites.end());
+  sort_unique(sites);
   for (const uint64_t s : all)
     f.tets.push_back(uint32_t(std::lower_bound(sites.begin(), sites.end(), s) - sites.begin()));
   for (const uint64_t s : sites) f.sites.push_back(unpack(s));

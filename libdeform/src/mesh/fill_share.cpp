@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "core/lists.h"
 #include "mesh/fill_lattice.h"
 
 namespace dfm {
@@ -156,8 +157,7 @@ FillShares sample_shares(const FillSurface &surface, const FillCover &cover, con
          "the %zu triangles enter %u cells more than %llu times: a tangle of long triangles bounds no body; "
          "remove those that reach across it, or ask for more cells",
          surface.tris.size() / 3, cover.cells.size(), static_cast<unsigned long long>(most));
-  std::sort(pairs.begin(), pairs.end());
-  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+  sort_unique(pairs);
   const auto sampled = uint32_t(std::count_if(cover.kind.begin(), cover.kind.end(), [](LatticeCell k) {
     return k == LatticeCell::crossed || k == LatticeCell::mixed;
   }));

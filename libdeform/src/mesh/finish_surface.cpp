@@ -12,6 +12,7 @@
 
 #include "core/disjoint_sets.h"
 #include "core/error.h"
+#include "core/lists.h"
 #include "deform/plugin.h"
 #include "math/vec3.h"
 #include "mesh/faces.h"
@@ -350,8 +351,7 @@ void renumber(RawMesh &raw, uint32_t inner) {
 // file's elements.
 void keep_used_groups(RawMesh &raw) {
   std::vector<uint32_t> used(raw.tri_group.begin(), raw.tri_group.end());
-  std::ranges::sort(used);
-  used.erase(std::unique(used.begin(), used.end()), used.end());
+  sort_unique(used);
   std::erase(used, kNoGroup);
   for (MeshGroup &group : raw.groups) {
     group.dimension = 2;

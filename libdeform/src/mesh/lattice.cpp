@@ -22,6 +22,7 @@
 
 #include "core/disjoint_sets.h"
 #include "core/error.h"
+#include "core/lists.h"
 #include "deform/plugin.h"
 #include "math/extent.h"
 #include "mesh/cells.h"
@@ -443,8 +444,7 @@ RestMesh make_lattice(const RestMesh &surface, uint32_t cells, double size) {
     out.inside.insert(out.inside.end(), inside.m, inside.m + kInsidePoints);
   }
   Array<uint64_t> sites = corners;
-  std::sort(sites.begin(), sites.end());
-  sites.erase(std::unique(sites.begin(), sites.end()), sites.end());
+  sort_unique(sites);
   for (const uint64_t s : sites) {
     const uint64_t at[3] = {s / (g.n[2] + 1) / (g.n[1] + 1), s / (g.n[2] + 1) % (g.n[1] + 1),
                             s % (g.n[2] + 1)};

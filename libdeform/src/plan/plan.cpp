@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/error.h"
+#include "core/lists.h"
 
 namespace dfm {
 
@@ -19,8 +20,7 @@ void plan_effects(const SceneFacts &f, Plan &plan) {
     names = f.requested;
   } else {
     for (const auto &p : f.offered) names.push_back(p.effect);
-    std::sort(names.begin(), names.end());
-    names.erase(std::unique(names.begin(), names.end()), names.end());
+    sort_unique(names);
   }
   for (const auto &name : names) {
     const std::string by = provider(f.offered, name);

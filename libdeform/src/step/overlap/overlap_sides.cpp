@@ -1,5 +1,6 @@
 #include "step/overlap/overlap_sides.h"
 
+#include "core/lists.h"
 #include "step/context.h"
 
 #include <algorithm>
@@ -108,8 +109,7 @@ OverlapSkin::OverlapSkin(const Memory &memory, const Obstacle &o)
     if (o.grid) slack_ = 0.5 * o.grid->cell();
   }
   std::vector<uint32_t> used(own_.tri.begin(), own_.tri.end());  // points that triangles have
-  std::sort(used.begin(), used.end());
-  used.erase(std::unique(used.begin(), used.end()), used.end());
+  sort_unique(used);
   for (uint32_t &i : own_.tri)
     i = static_cast<uint32_t>(std::lower_bound(used.begin(), used.end(), i) - used.begin());
   own_.ntri = static_cast<uint32_t>(own_.tri.size() / 3);

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "core/error.h"
+#include "core/lists.h"
 #include "dynamics/rigid/rigid_set.h"
 #include "state/obstacle.h"
 #include "state/world.h"
@@ -56,8 +57,7 @@ void ToolTouch::list(const WorldState &state, const Solution &solution) {
         row.gap - offset_ < kApart * offset_ && std::binary_search(before.begin(), before.end(), pair);
     if (row.impulse > 0 || goes_on) next_touching_.push_back(pair);
   }
-  std::sort(next_touching_.begin(), next_touching_.end());
-  next_touching_.erase(std::unique(next_touching_.begin(), next_touching_.end()), next_touching_.end());
+  sort_unique(next_touching_);
 }
 
 // Allocates nothing.
@@ -98,8 +98,7 @@ void find_touching(const World &w, const ContactStore &of, Array<RigidPair> &out
     const PairSides sides = pair_sides(w, of, i);
     out.push_back({sides.a, sides.b});
   }
-  std::sort(out.begin(), out.end());
-  out.erase(std::unique(out.begin(), out.end()), out.end());
+  sort_unique(out);
 }
 
 }  // namespace dfm

@@ -1,4 +1,5 @@
 #include "step/rigid/rigid.h"
+#include "core/lists.h"
 #include "step/rigid/tool_touch.h"
 
 #include <algorithm>
@@ -403,8 +404,7 @@ void ToolTouch::find_near(const Views &views) {
              [&](uint32_t p, uint32_t q, double) { add(moved_.at(p), still_.at(q)); });
   near_self_pairs(moved_.tree, 0, stack_,
                   [&](uint32_t p, uint32_t q, double) { add(moved_.at(p), moved_.at(q)); });
-  std::sort(near_.begin(), near_.end());
-  near_.erase(std::unique(near_.begin(), near_.end()), near_.end());
+  sort_unique(near_);
 }
 
 // Calls f(pair, the two shapes, their sides) for all pairs that may touch and of which one yields.
