@@ -57,6 +57,7 @@ struct Stage {
   StageRole role = StageRole::none;
   // Observes the result and steers nothing. False: the sub-step fails.
   bool (*check)(World &w, StepContext &step, uint32_t *trouble) = nullptr;
+  bool takes_all = false;  // of the world, or of the buffers of a step, in place of parts
 
   Next take(World &w, StepContext &step, uint32_t *trouble) const {
     const Next next = run(w, step, trouble);

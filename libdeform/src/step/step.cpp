@@ -58,42 +58,50 @@ Next call(R (*stage)(P...), World &w, StepContext &step, uint32_t *trouble) {
   }
 }
 template <auto stage>
-Next row(World &w, StepContext &step, uint32_t *trouble) {
+Next called(World &w, StepContext &step, uint32_t *trouble) {
   return call(stage, w, step, trouble);
 }
-
 template <class R, class... P>
-constexpr bool takes_world(R (*)(P...)) {
-  return (std::is_same_v<std::remove_cvref_t<P>, World> || ...);
+constexpr bool takes_all(R (*)(P...)) {
+  return (std::is_same_v<std::remove_cvref_t<P>, World> || ...) ||
+         (std::is_same_v<std::remove_cvref_t<P>, StepContext> || ...);
 }
-template <auto... stages>
-constexpr int kTakeWorld = (takes_world(stages) + ...);
-static_assert(kTakeWorld<stage_motion, stage_model, stage_predict, stage_rigid_predict, stage_gather,
-                         stage_broad, stage_narrow, stage_self, stage_solve, stage_rigid_commit,
-                         stage_distribute, stage_guard, stage_commit, stage_sleep> <= 3,
-              "a stage takes the parts that it reads and writes");
+template <auto stage>
+constexpr Stage row(const char *name, const char *cost, StageChoice (*when)(const SceneFacts &),
+                    StageRole role = StageRole::none, decltype(Stage::check) check = nullptr) {
+  return {name,
+          [](World &w, StepContext &step, uint32_t *trouble) { return call(stage, w, step, trouble); },
+          cost,
+          when,
+          role,
+          check,
+          takes_all(stage)};
+}
 
 constexpr Stage kTable[] = {
-    {"motion", row<stage_motion>, "what is prescribed", when::motion},
-    {"model", row<stage_model>, "cells", when::model},
-    {"predict", row<stage_predict>, "points", when::predict, StageRole::none, watch_energy},
-    {"rigid predict", row<stage_rigid_predict>, "rigid bodies", when::rigid_predict},
-    {"gather", row<stage_gather>, "points of surfels", when::gather},
-    {"broad", row<stage_broad>, "surfels every sub-step; triangles whenever a skin is used up", when::broad,
-     StageRole::lists_pairs},
-    {"narrow", row<stage_narrow>, "candidate pairs", when::narrow, StageRole::finds_contacts},
-    {"self contact", row<stage_self>,
-     "surfels every sub-step, and what of them is near; triangles whenever a skin is used up", when::self},
-    {"contact+friction", row<stage_solve>, "contacts x sweeps, laws once per pass", when::solve,
-     StageRole::solves},
-    {"rigid commit", row<stage_rigid_commit>, "rigid bodies", when::rigid_commit},
-    {"distribute", row<stage_distribute>, "contacts and surfels", when::distribute,
-     StageRole::reports_impulses},
-    {"guard", row<stage_guard>, "candidate pairs that may come nearer than d_c / 2 within the sub-step",
-     when::guard, StageRole::guards},
-    {"commit", row<stage_commit>, "points", when::commit},
-    {"sleep", row<stage_sleep>, "velocities of bodies that are awake", when::sleep},
+    row<stage_motion>("motion", "what is prescribed", when::motion),
+    row<stage_model>("model", "cells", when::model),
+    row<stage_predict>("predict", "points", when::predict, StageRole::none, watch_energy),
+    row<stage_rigid_predict>("rigid predict", "rigid bodies", when::rigid_predict),
+    row<stage_gather>("gather", "points of surfels", when::gather),
+    row<stage_broad>("broad", "surfels every sub-step; triangles whenever a skin is used up", when::broad,
+                     StageRole::lists_pairs),
+    row<stage_narrow>("narrow", "candidate pairs", when::narrow, StageRole::finds_contacts),
+    row<stage_self>("self contact",
+                    "surfels every sub-step, and what of them is near; triangles whenever a skin is used up",
+                    when::self),
+    row<stage_solve>("contact+friction", "contacts x sweeps, laws once per pass", when::solve,
+                     StageRole::solves),
+    row<stage_rigid_commit>("rigid commit", "rigid bodies", when::rigid_commit),
+    row<stage_distribute>("distribute", "contacts and surfels", when::distribute,
+                          StageRole::reports_impulses),
+    row<stage_guard>("guard", "candidate pairs that may come nearer than d_c / 2 within the sub-step",
+                     when::guard, StageRole::guards),
+    row<stage_commit>("commit", "points", when::commit),
+    row<stage_sleep>("sleep", "velocities of bodies that are awake", when::sleep),
 };
+static_assert(std::ranges::count_if(kTable, &Stage::takes_all) <= 3,
+              "a stage takes the parts that it reads and writes");
 
 using Clock = std::chrono::steady_clock;
 
@@ -409,10 +417,10 @@ bool catch_up(World &w, StepContext &step, uint32_t *trouble) {
   {
     const Restored all{w};
     step.active.swap(step.woken);
-    for (const auto stage : {row<stage_model>, row<stage_predict>, row<stage_gather>})
+    for (const auto stage : {called<stage_model>, called<stage_predict>, called<stage_gather>})
       if (stage(w, step, trouble) != Next::stage) return false;
   }
-  return row<stage_broad>(w, step, trouble) == Next::stage;
+  return called<stage_broad>(w, step, trouble) == Next::stage;
 }
 
 // The place of a role among the planned stages.
