@@ -68,6 +68,21 @@ class Command(unittest.TestCase):
                 self.assertEqual([*pathlib.Path(folder).iterdir()], [file])
                 self.assertEqual(file.read_text(), '{"picture": "mine.png"}')
 
+    def test_demo_without_a_renderer_is_the_table(self):
+        with tempfile.TemporaryDirectory() as folder:
+            command, out = pathlib.Path(folder) / "deform.py", pathlib.Path(folder) / "out"
+            command.write_text(f"#!{sys.executable}\nimport shutil, subprocess, sys\n"
+                               "call = ['-B', '-m', 'deform', *sys.argv[1:], '--time', '0.01']\n"
+                               "subprocess.run([sys.executable, *call], check=True)\n"
+                               "shutil.rmtree(sys.argv[sys.argv.index('--out') + 1] + '/frames')\n")
+            command.chmod(0o755)
+            demo = pathlib.Path(deform.__file__).parent / "demo.py"
+            done = subprocess.run([sys.executable, "-B", demo, command, SCENES / "two_cylinders.json", out],
+                                  text=True, capture_output=True, check=True)
+            self.assertRegex(done.stdout, r"(?m)^moved \(m\) +0\.\d+ +0\.\d+$")
+            self.assertIn("no picture (see above)", done.stdout)
+            self.assertFalse((out / "two_cylinders.png").exists())
+
 
 if __name__ == "__main__":
     unittest.main()

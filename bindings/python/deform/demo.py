@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """`make demo`, `python -m deform demo [OUT_DIR]`: two cylinders with friction and without, as a table, one
-picture with two rows, and summary.json.
+picture with two rows (where the command has the renderer), and summary.json.
 
 demo.py DEFORM_COMMAND SCENE OUT_DIR
 """
@@ -41,7 +41,7 @@ def simulate(command: Any, scene: Any, out: pathlib.Path, label: str,
         rows = [r for r in csv.DictReader(file) if r["body"] == "upper"]
     start, end = ([float(row[f"com_{axis}"]) for axis in "xyz"] for row in (rows[0], rows[-1]))
     frames = sorted((folder / "frames").glob("*.png"))
-    if len(frames) <= round(TIMES[-1] * FRAMES_PER_SECOND):
+    if 0 < len(frames) <= round(TIMES[-1] * FRAMES_PER_SECOND):
         sys.exit(f"demo: {folder}/frames holds {len(frames)} pictures; the scene is shorter than {TIMES[-1]} "
                  f"s")
     return {
@@ -50,7 +50,7 @@ def simulate(command: Any, scene: Any, out: pathlib.Path, label: str,
         "intersections_max": summary["intersections_max"], "steps": summary["steps"],
         "simulated_s": summary["simulated_s"],
         "steps_per_second": 1000 / summary["ms_per_step"]["median"], "state_hash": summary["state_hash"],
-        "pictures": [str(frames[round(t * FRAMES_PER_SECOND)]) for t in TIMES],
+        "pictures": [str(frames[round(t * FRAMES_PER_SECOND)]) for t in TIMES if frames],
     }
 
 
@@ -85,10 +85,12 @@ def demo(command: Any, scene: Any, out: pathlib.Path) -> None:
     told = {"scene": str(scene), "picture": str(picture), "runs": runs}
     partial.write_text(json.dumps(told, indent=2) + "\n")
     partial.replace(summary)
-    run(command, "montage", *(part for label, r in runs.items() for part in ("--row", label, *r["pictures"])),
-        "--out", picture)
+    drawn = all(r["pictures"] for r in runs.values())
+    if drawn:
+        rows = (part for label, r in runs.items() for part in ("--row", label, *r["pictures"]))
+        run(command, "montage", *rows, "--out", picture)
     table(runs)
-    print(f"\npicture {picture}, figures {summary}")
+    print(f"\n{f'picture {picture}' if drawn else 'no picture (see above)'}, figures {summary}")
 
 
 if __name__ == "__main__":
