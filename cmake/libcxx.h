@@ -43,25 +43,26 @@ unique_ptr<T> make_unique_for_overwrite(size_t n) {
 #if _LIBCPP_VERSION < 15000
 namespace ranges {
 
+using greater_equal = std::greater_equal<>;
 template <class Less, class Projection>
 auto projected_less(Less less, Projection p) {
   return [less, p](const auto &a, const auto &b) {
     return std::invoke(less, std::invoke(p, a), std::invoke(p, b));
   };
 }
-template <class R, class Less = less, class P = identity>
+template <class R, class Less = std::less<>, class P = identity>
 void sort(R &&r, Less less = {}, P p = {}) {
   std::sort(std::begin(r), std::end(r), projected_less(less, p));
 }
-template <class R, class Less = less, class P = identity>
+template <class R, class Less = std::less<>, class P = identity>
 void stable_sort(R &&r, Less less = {}, P p = {}) {
   std::stable_sort(std::begin(r), std::end(r), projected_less(less, p));
 }
-template <class R, class Less = less, class P = identity>
+template <class R, class Less = std::less<>, class P = identity>
 bool is_sorted(R &&r, Less less = {}, P p = {}) {
   return std::is_sorted(std::begin(r), std::end(r), projected_less(less, p));
 }
-template <class R, class T, class Less = less, class P = identity>
+template <class R, class T, class Less = std::less<>, class P = identity>
 auto lower_bound(R &&r, const T &value, Less less = {}, P p = {}) {
   return std::lower_bound(std::begin(r), std::end(r), value,
                           [&](const auto &a, const T &b) { return std::invoke(less, std::invoke(p, a), b); });
@@ -70,9 +71,23 @@ template <class R, class T, class P = identity>
 auto find(R &&r, const T &value, P p = {}) {
   return std::find_if(std::begin(r), std::end(r), [&](const auto &a) { return std::invoke(p, a) == value; });
 }
-template <class R, class Good>
-bool any_of(R &&r, Good good) {
-  return std::any_of(std::begin(r), std::end(r), [&](const auto &a) { return std::invoke(good, a); });
+template <class R, class T, class Less = std::less<>, class P = identity>
+auto upper_bound(R &&r, const T &value, Less less = {}, P p = {}) {
+  return std::upper_bound(std::begin(r), std::end(r), value,
+                          [&](const T &b, const auto &a) { return std::invoke(less, b, std::invoke(p, a)); });
+}
+template <class R, class Good, class P = identity>
+auto find_if(R &&r, Good good, P p = {}) {
+  return std::find_if(std::begin(r), std::end(r),
+                      [&](const auto &a) { return std::invoke(good, std::invoke(p, a)); });
+}
+template <class R, class T, class P = identity>
+auto count(R &&r, const T &value, P p = {}) {
+  return std::count_if(std::begin(r), std::end(r), [&](const auto &a) { return std::invoke(p, a) == value; });
+}
+template <class R, class Good, class P = identity>
+bool any_of(R &&r, Good good, P p = {}) {
+  return ranges::find_if(r, good, p) != std::end(r);
 }
 template <class R, class Good>
 bool all_of(R &&r, Good good) {
@@ -90,11 +105,15 @@ template <class R, class Good, class P = identity>
 auto adjacent_find(R &&r, Good good, P p = {}) {
   return std::adjacent_find(std::begin(r), std::end(r), projected_less(good, p));
 }
-template <class R, class S, class Same = equal_to, class P = identity, class Q = identity>
+template <class R, class S, class Same = std::equal_to<>, class P = identity, class Q = identity>
 bool equal(R &&r, S &&s, Same same = {}, P p = {}, Q q = {}) {
   return std::equal(
       std::begin(r), std::end(r), std::begin(s), std::end(s),
       [&](const auto &a, const auto &b) { return std::invoke(same, std::invoke(p, a), std::invoke(q, b)); });
+}
+template <class R, class Out>
+void copy(R &&r, Out out) {
+  std::copy(std::begin(r), std::end(r), out);
 }
 template <class R, class T>
 void fill(R &&r, const T &value) {

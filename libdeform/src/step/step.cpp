@@ -100,7 +100,8 @@ constexpr Stage kTable[] = {
     row<stage_commit>("commit", "points", when::commit),
     row<stage_sleep>("sleep", "velocities of bodies that are awake", when::sleep),
 };
-static_assert(std::ranges::count_if(kTable, &Stage::takes_all) <= 3,
+static_assert(std::count_if(std::begin(kTable), std::end(kTable),
+                            [](const Stage &stage) { return stage.takes_all; }) <= 3,
               "a stage takes the parts that it reads and writes");
 
 using Clock = std::chrono::steady_clock;
