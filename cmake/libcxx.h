@@ -43,7 +43,6 @@ unique_ptr<T> make_unique_for_overwrite(size_t n) {
 #if _LIBCPP_VERSION < 15000
 namespace ranges {
 
-using greater_equal = std::greater_equal<>;
 template <class Less, class Projection>
 auto projected_less(Less less, Projection p) {
   return [less, p](const auto &a, const auto &b) {
@@ -118,6 +117,10 @@ void copy(R &&r, Out out) {
 template <class R, class T>
 void fill(R &&r, const T &value) {
   std::fill(std::begin(r), std::end(r), value);
+}
+template <class R>
+auto min(R &&r) {
+  return *std::min_element(std::begin(r), std::end(r));
 }
 template <class R>
 auto max(R &&r) {

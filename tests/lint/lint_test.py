@@ -107,6 +107,7 @@ BAD = {
     "columns": [("libdeform/src/core/error.h", "// " + "x" * 108 + "\n"), ("Makefile", "#" * 111 + "\n"),
                 (".ci/run", "#" * 111 + "\n"), ("CMakeLists.txt", "#" * 111 + "\n"),
                 ("libdeform/src/core/error.h", 'const char *a = R"(' + "x" * 100 + ')";\n')],
+    "ranges": [("libdeform/src/core/error.h", "bool x = std::ranges::partition(a);\n")],
     "subjects": [("libdeform/src/core/error.h", "// Of a body.\n"),
                  ("libdeform/src/core/error.h", "/** Of a piece. */\n")],
     "statements": [("libdeform/src/broad/tree.cpp", f"void f() {{ {chain} }}\n") for chain in (

@@ -221,6 +221,17 @@ def stages(tree):
                 yield path, line_of(text, match.start()), f"calls {match.group(1)}: return Next, or a reason"
 
 
+def ranges(tree):
+    """What is used of std::ranges has a stand-in for the library of LLVM (WebAssembly, macOS)."""
+    stand_ins = "".join(tree.text(path) for path in tree.select("cmake/libcxx.h"))
+    given = set(re.findall(r"^(?:auto|bool|void) (\w+)\(R ", stand_ins, re.M))
+    for path in tree.select("libdeform/src/", "plugins/", "bindings/"):
+        for match in re.finditer(r"\branges::(\w+)", tree.text(path)):
+            if match[1] not in given:
+                yield (path, line_of(tree.text(path), match.start()),
+                       f"std::ranges::{match[1]} has no stand-in in cmake/libcxx.h; add it there")
+
+
 RULES = {"layers": layers, "public_only": public_only, "systems": systems, "plugin_includes": plugin_includes,
-         "third_parties": third_parties, "stages": stages,
+         "third_parties": third_parties, "stages": stages, "ranges": ranges,
          "numbers": numbers, "libm": libm, "kernels": kernels}

@@ -21,7 +21,7 @@ namespace {
 
 template <class List, class Key = std::identity>
 bool rises(const List &list, Key key = {}) {
-  return std::ranges::adjacent_find(list, std::ranges::greater_equal{}, key) == list.end();
+  return std::ranges::adjacent_find(list, std::greater_equal<>{}, key) == list.end();
 }
 
 bool has_shape(const Body &b, const CutRow &r) {
